@@ -88,7 +88,7 @@ def task(method: str, system: Any, x: PETSc.Vec) -> Callable[[], Any]:
     assert assessor.inertia is not None
     if method == "factorisation":
         found = assessor.inertia.at(x)
-        return lambda: found.below(found.shift + 1e-3)
+        return lambda: found.eigenvalue_count(found.shift + 1e-3)
     if method == "index":
         regular = RegularPoints(assessor.inertia)
         return lambda: regular.at(x)
@@ -96,7 +96,7 @@ def task(method: str, system: Any, x: PETSc.Vec) -> Callable[[], Any]:
         return lambda: assessor.inertia.at(x)
     if method == "solves":
         found = assessor.inertia.at(x)
-        found.below(0.0)
+        found.eigenvalue_count(0.0)
         right = np.zeros((x.local_size, 2))
         return lambda: found.factors.solve_all(right)
     if method in ("eigenvalues", "proof", "scipy", "dense QZ"):
@@ -109,10 +109,10 @@ def of_pencil(method: str, assessor: Assessor, x: PETSc.Vec) -> Callable[[], Any
     assessor.system.set_phase(x)
     if method == "eigenvalues":
         return lambda: assessor.symmetric.at(x).leftmost(NUMBER).values
-    spectrum = assessor.below(x)
+    spectrum = assessor.low_pencil(x)
     if method == "proof":
         cuts = itertools.count()
-        return lambda: spectrum.below(spectrum.shift + 1e-3 * next(cuts))
+        return lambda: spectrum.eigenvalue_count(spectrum.shift + 1e-3 * next(cuts))
     S, M = gathered(spectrum.matrix).tocsc(), gathered(spectrum.mass).tocsc()
     if method == "dense QZ":
         return lambda: scipy.linalg.eigvals(S.toarray(), M.toarray())

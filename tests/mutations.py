@@ -62,7 +62,7 @@ TABLE = {
             "adaptivity/test_grading.py"),
     },
     "rodfem/adaptivity/soft_states.py": {
-        "vanishing": ("_across(metric, near.vectors, vanishing)", "_across(metric, near.vectors, ())", AT_SPECIAL),
+        "vanishing": ("_rank(metric, near.vectors, vanishing)", "_rank(metric, near.vectors, ())", AT_SPECIAL),
         "changed-by-itself": (
             "np.where(away > abs(coarse), left + away, left)", "np.where(contrary, left + away, left)", AT_SPECIAL),
         "another-state": ("if soft and not again.resolved:", "if soft and again.changed < 0:", AT_SPECIAL),
@@ -451,7 +451,7 @@ TABLE = {
     },
     "rodfem/fem/newton.py": {
         "ways-down-that-go-uphill": (
-            "if isfinite(longest) and along(system, x, step) < 0:", "if False:", "hard/test_fuzz.py"),
+            "if isfinite(longest) and quadratic_form(system, x, step) < 0:", "if False:", "hard/test_fuzz.py"),
         "rows-are-no-equilibria": (
             "if worst <= VIOLATED or", "if worst <= 1e9 * VIOLATED or", "continuation/test_row_checks.py"),
         "corrections-that-grow-are-round-off": (" and self.hold()", "", "literature/test_walls.py"),
@@ -602,7 +602,7 @@ TABLE = {
         "constraints-are-miscounted": (
             "below = negative - self.constraints - drifts", "below = negative - self.constraints", INERTIA),
         "symmetries-are-no-zeros": (
-            "zero = self.below(own.tolerance) - negative + self.drifts", "zero = self.below(own.tolerance) - negative",
+            "zero = self.eigenvalue_count(own.tolerance) - negative + self.drifts", "zero = self.eigenvalue_count(own.tolerance) - negative",
             "stability/test_inertia.py stability/test_assessment.py literature/test_hemitropic_buckled.py"),
         "band-is-wide": (
             "ZERO_BAND = 1e-7", "ZERO_BAND = 1e-2",
@@ -628,8 +628,8 @@ TABLE = {
             "            force.array[drifts] = 0.0\n", "", "literature/test_free_rods.py"),
         "left-vectors-have-free-motions": ("if free and not left:", "if free:", "literature/test_free_rods.py"),
         "rigid-motions-take-all-digits": (
-            "found = self.near(number + BEYOND, SHIFT * self._one, left=left)",
-            "found = self.near(number + BEYOND, 0.0, left=left)", "literature/test_free_rods.py"),
+            "found = self.nearest(number + BEYOND, SHIFT * self._one, left=left)",
+            "found = self.nearest(number + BEYOND, 0.0, left=left)", "literature/test_free_rods.py"),
     },
     "rodfem/stability/pencil.py": {
         "symmetric-pencils-without-natural-units": (

@@ -37,7 +37,7 @@ def kernels(diagram: Any, name: str) -> dict[str, float]:
     solver = diagram.solvers[point.mesh]
     inertia, system = solver.inertia, solver.system
     found = inertia.at(point.x)
-    found.below(0.0)
+    found.eigenvalue_count(0.0)
     right = np.ones((system.fields.unknowns, 6))
     out = {"factors": least(lambda: inertia.factors(inertia.matrix))}
     out |= {f"{k} solutions": least(lambda k=k: inertia.factors.solve_all(right[:, :k])) for k in (1, 3, 6)}

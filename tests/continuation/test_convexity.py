@@ -38,7 +38,7 @@ def test_a_stiffness_that_the_load_takes_away(energy: Energy) -> None:
     """Past it 48 eigenvalues of a mesh of 48 nodes were negative, and that was called a branch point."""
     (branch,) = trace(rod(energy), MESH, Plan(depth=0, error_bars=False))
     assert branch.ended.startswith("the stored energy is not convex any more at P = ")
-    assert not [s for s in branch.special if not s.kind.given]
+    assert not [s for s in branch.special if not s.kind.request]
     assert 0.85 < branch.points[-1].load < 1.0
     assert {p.negative for p in branch.points} == {0}
     with pytest.raises(SceneError, match=r"not convex somewhere along the state at P = 1\b"):

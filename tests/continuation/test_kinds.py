@@ -25,7 +25,7 @@ def test_a_kind_is_its_name() -> None:
 def test_what_leaves_and_what_has_a_locus() -> None:
     """As AUTO-07p: branches are switched at BP alone; loci are of what happens, not of what was asked for."""
     assert [kind for kind in KINDS.values() if kind.branches] == [BRANCH_POINT]
-    assert {name for name, kind in KINDS.items() if kind.given} == {USER, END}
+    assert {name for name, kind in KINDS.items() if kind.request} == {USER, END}
     assert set(LINES) == {"branch point", "fold", "flutter", "divergence"}
     assert set(KINDS) - {END} == {name for name in MARKERS if name in KINDS}
     assert all(len(kind.code) == 2 for kind in KINDS.values())

@@ -43,7 +43,7 @@ def test_tangent_is_that_of_lu_factors(name: str) -> None:
     point = min(branch.points[2:-2], key=lambda p: abs(p.load - wanted[1]))
     row = follower.row(point.tangent)
     tangent, regular = follower._tangent(row, point.x), follower.regular.at(point.x)
-    assert regular is not None and system.norm(regular.along(row) - tangent) < 1e-12
+    assert regular is not None and system.norm(regular.unit_tangent(row) - tangent) < 1e-12
     image = system.at(point.x).jacobian(row) * tangent  # J t = (0, row . t)
     system.set_load(image, 0.0)
     assert image.norm() < 1e-9 * system.matrix.norm()

@@ -34,7 +34,7 @@ def bent(formulation: str) -> tuple[BranchSolver, Point]:
 
 def spoilt(system: System, x: PETSc.Vec, field: str) -> PETSc.Vec:
     """The state with the values of a field at one node inside an element changed a little."""
-    values = system.at(x).named
+    values = system.at(x).parts
     middle = len(values[field]) // 2
     values[field] = values[field].copy()
     values[field][middle, 2] += SMALL

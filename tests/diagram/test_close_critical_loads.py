@@ -48,7 +48,7 @@ def agree(found: Sequence[tuple[float, float, int, int]], exact: Sequence[float]
 def adds_up(diagram: Diagram, say: bool = False) -> None:
     """From row to row the number of unstable eigenvalues changes by what special points say, and nothing is left."""
     branch = diagram[0]
-    at = {id(s.point): s for s in branch.special if not s.kind.given}
+    at = {id(s.point): s for s in branch.special if not s.kind.request}
     number = branch.points[0].negative
     for p in branch.points:
         if (s := at.get(id(p))) is not None:

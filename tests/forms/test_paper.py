@@ -389,7 +389,7 @@ def hamilton_stack(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def by_hand(system: System, w: fem.Function) -> Any:
     """``second_variation`` at the system's state in the direction ``w``, compiled."""
     e, f, scene = system.equations, system.fields, system.scene
-    u, d = e.unknowns, e._named(ufl.split(w))
+    u, d = e.unknowns, e._parts(ufl.split(w))
     c, free = e._constants(u.load), scene.free_strains
     v = strain(free, e.components(u.v, len(free)))
     zero = ufl.as_vector([0.0] * 3)

@@ -28,7 +28,7 @@ SPLIT = 0.5
 
 def located(diagram: Diagram, name: str, interval: tuple[float, float], **given: Any) -> Locus:
     """Locus of the last special point of a diagram that is not given."""
-    special = next(s for s in reversed(diagram[0].special) if not s.kind.given)
+    special = next(s for s in reversed(diagram[0].special) if not s.kind.request)
     return diagram.locus(special, name, interval, **given)
 
 

@@ -146,7 +146,7 @@ def test_a_sweep_keeps_what_it_has(
         calls[0] += 1
         return calls[0] > 9  # three of them at the first state alone, for its two shifts
 
-    monkeypatch.setattr(NonsymmetricPencil, "about", failing(NonsymmetricPencil.inverse, later, fault))
+    monkeypatch.setattr(NonsymmetricPencil, "inverse", failing(NonsymmetricPencil.inverse, later, fault))
     (branch,) = run(rod, mesh, None, folder, figures=False, quiet=True)
     assert branch.ended.startswith("no convergence: ") and str(branch.special[-1].kind) == "end"
     assert 4 <= len(branch.points) < len(whole)

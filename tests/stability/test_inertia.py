@@ -76,7 +76,7 @@ def test_index_is_that_of_dense_matrices(formulation: str, branch: int, load: fl
     assert found.zero == p.zero == (abs(mu) < f.inertia.tolerance).sum() == (0 if branch == 0 else 1)
     others = mu[abs(mu) > f.inertia.tolerance]
     for sigma in (-3.0, -0.3, -0.03, 0.03, 0.3, 3.0):
-        assert f.inertia.at(p.x).below(sigma) == (others < sigma).sum()
+        assert f.inertia.at(p.x).eigenvalue_count(sigma) == (others < sigma).sum()
 
 
 @FORMULATIONS
@@ -129,14 +129,14 @@ def test_the_matrix_is_kept_for_the_state_that_it_holds() -> None:
     """Asked for the same state again it is not assembled or factored; it is after a shift, and for another state."""
     f, p, q = follower("reduced", *SMALL), state("reduced", 1, 0.25), state("reduced", 2, 0.5)
     anew = [dense(f.inertia.at(point.x).matrix) for point in (q, p)][-1]
-    index = f.inertia.at(p.x).below(0.0)
+    index = f.inertia.at(p.x).eigenvalue_count(0.0)
     before = compiled()
-    assert f.inertia.at(p.x).below(0.0) == index
+    assert f.inertia.at(p.x).eigenvalue_count(0.0) == index
     assert compiled() == before
     for disturb in (lambda: f.inertia.at(p.x).count(), lambda: f.inertia.at(q.x), f.inertia.forget_band):
         disturb()
         assert dense(f.inertia.at(p.x).matrix) == pytest.approx(anew, abs=1e-13 * abs(anew).max())
-        assert f.inertia.at(p.x).below(0.0) == index
+        assert f.inertia.at(p.x).eigenvalue_count(0.0) == index
     assert compiled()["factorisations"] == before["factorisations"] + 5
 
 

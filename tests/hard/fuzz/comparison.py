@@ -154,7 +154,7 @@ def open_questions(diagram: Diagram) -> list[str]:
     """All that a diagram says it could not decide."""
     unexplained = [str(u) for b in diagram for u in b.unexplained]
     ended = [f"{b.name} ended: {b.ended}" for b in diagram if not b.ended.startswith(ENDED)]
-    points = [s for b in diagram for s in b.special if not s.kind.given]
+    points = [s for b in diagram for s in b.special if not s.kind.request]
     notes = [f"{s!r}: {s.note}" for s in points if s.note and not (s.event and s.note == s.event.name)]
     unresolved = [f"{s!r} is not resolved" for s in points if s.resolved is False]
     return [*diagram.warnings, *(n.strip() for n in diagram.notes if "eigenvalue" in n), *unexplained, *ended, *notes,
@@ -292,7 +292,7 @@ def whole(branch: Branch) -> bool:
 
 def singular(branch: Branch) -> list[SpecialPoint]:
     """Special points at which something happens to the rod, not to a number of its state alone."""
-    return [s for s in branch.special if not s.kind.given and s.kind != EVENT]
+    return [s for s in branch.special if not s.kind.request and s.kind != EVENT]
 
 
 def _place(s: SpecialPoint) -> tuple[float, float]:
