@@ -602,7 +602,8 @@ TABLE = {
         "constraints-are-miscounted": (
             "below = negative - self.constraints - drifts", "below = negative - self.constraints", INERTIA),
         "symmetries-are-no-zeros": (
-            "zero = self.eigenvalue_count(own.tolerance) - negative + self.drifts", "zero = self.eigenvalue_count(own.tolerance) - negative",
+            "zero = self.eigenvalue_count(own.tolerance) - negative + self.drifts",
+            "zero = self.eigenvalue_count(own.tolerance) - negative",
             "stability/test_inertia.py stability/test_assessment.py literature/test_hemitropic_buckled.py"),
         "band-is-wide": (
             "ZERO_BAND = 1e-7", "ZERO_BAND = 1e-2",

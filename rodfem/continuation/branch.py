@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -39,6 +39,7 @@ class Point:
     the ``reactions`` of its supports.
     """
 
+    sensitivity: ClassVar[Callable[[], Any]]  # the module of derivatives, of a room above, which is bound there
     x: PETSc.Vec  #: state vector
     tangent: PETSc.Vec | None  #: unit tangent of the branch in the metric; None where no branch is followed
     arclength: float  #: length of the branch from its start, in the metric
@@ -177,9 +178,7 @@ class Point:
         Raises :class:`~rodfem.errors.InputError` for what is no constant of the scene, and
         :class:`~rodfem.errors.ConvergenceError` where the state is singular.
         """
-        from rodfem.codim2.sensitivity import ordinate_derivative
-
-        return ordinate_derivative(self, parameter)
+        return Point.sensitivity().ordinate_derivative(self, parameter)
 
     def backwards(self, total: float) -> Point:
         """The same equilibrium on the branch of length ``total`` followed the other way."""
@@ -292,24 +291,18 @@ class SpecialPoint:
         a ``.density``, of a parameter that varies.  Raises :class:`~rodfem.errors.InputError` for what has none, and
         :class:`~rodfem.errors.ConvergenceError` where the parameter takes the special point apart.
         """
-        from rodfem.codim2.sensitivity import derivative
-
-        return derivative(self, parameter, along_the_rod=along_the_rod)
+        return Point.sensitivity().derivative(self, parameter, along_the_rod=along_the_rod)
 
     def coefficient_derivative(self, parameter: str) -> Derivative:
         """The same of the coefficient of its :attr:`law`: how much more, or less, a bent rod carries."""
-        from rodfem.codim2.sensitivity import coefficient_derivative
-
-        return coefficient_derivative(self, parameter)
+        return Point.sensitivity().coefficient_derivative(self, parameter)
 
     def tolerance(self, deviations: Mapping[str, float]) -> Tolerance:
         """Standard deviation of its load by those of constants, ``{"A": 0.02}``, to first order; and the mesh's error.
 
         Raises :class:`~rodfem.errors.InputError` for one that is not positive, and what :meth:`derivative` does.
         """
-        from rodfem.codim2.sensitivity import tolerance
-
-        return tolerance(self, deviations)
+        return Point.sensitivity().tolerance(self, deviations)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -41,6 +42,16 @@ RANKS: Check = a(MPI.Comm, "a communicator of mpi4py, as in @=MPI.COMM_SELF")
 POINT: Check = a((Point, SpecialPoint), "a point of a branch, as in diagram['branch 1'].points[0]")
 STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vector of the solver's system")
 METHOD: Check = text("auto")  # checks of arguments that several functions have
+
+
+def _sensitivity() -> Any:
+    """Module of the derivatives of points: it stands above them, and is loaded when one is asked for."""
+    from rodfem.codim2 import sensitivity
+
+    return sensitivity
+
+
+Point.sensitivity = staticmethod(_sensitivity)
 
 
 class Solver:
