@@ -33,7 +33,7 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.expressions import Variable, differentiated, extract_coefficients, extract_type
-from rodfem.fem.assembly import Assembler, Cells, Places, vector_places
+from rodfem.fem.assembly import Assembler, Cells, Places
 from rodfem.fem.equations import Equations
 from rodfem.fem.state import NodalValues
 from rodfem.fem.system import System
@@ -128,6 +128,8 @@ class Convexity:
 class Pieces:
     """Forms of some ``equations`` on their own cells, each cut into equal pieces: values are (pieces, cells, n).
 
+    The pieces of several cuts, with the given numbers of pieces each, come one cut after the other.
+
     ``dofs`` (cells, n) are local degrees of freedom, and ``rows`` says which of these n each field has.  The rule of an
     element has as many ``points``, and a ``number`` of pieces makes a rule of :data:`POINTS`.
     """
@@ -143,51 +145,59 @@ class Pieces:
         self.number = max(LEAST, 2 ** round(np.log2(POINTS / d.elements / self.points)))
         self._load = numbers[int(self.fields.copies[0, -1])]
         self._cells, self._bases = cache(self._cut), cache(self._tabulated)
-        self._form = cache(
-            lambda form, n: Assembler(form.form, self._cells(n), equations.known.cut(n), self._load, inside=True)
-        )
+        self._places = cache(lambda *cuts: Places(self._cells(*cuts).dofs))
+        self._form = cache(self._assembler)
 
-    def vectors(self, form: Assembler, values: np.ndarray, pieces: int) -> np.ndarray:
+    def vectors(self, form: Assembler, values: np.ndarray, *cuts: int) -> np.ndarray:
         """A linear form, whose parameters have been taken, where the unknown has these ``values`` (cells, n)."""
-        every = self._cells(pieces).dofs
-        return self._assembled(form, values, pieces, vector_places(every, np.arange(every.size)))
+        return self._assembled(form, values, cuts, self._places(*cuts))
 
-    def rigid(self, form: Assembler, values: np.ndarray, pieces: int) -> np.ndarray:
+    def rigid(self, form: Assembler, values: np.ndarray, *cuts: int) -> np.ndarray:
         """A bilinear form times a change of one in all rotations and positions."""
-        every = self._cells(pieces).dofs
+        every = self._cells(*cuts).dofs
         moving = [rows.ravel() for name, rows in self.rows.items() if name in (self.fields.turning.name, "r")]
         chosen = np.where(np.isin(np.arange(every.shape[1]), np.concatenate(moving)), 0, -1)
         places = Places(every, np.zeros_like(every), np.broadcast_to(chosen, (len(every), 1, every.shape[1])))
-        return self._assembled(form, values, pieces, places)
+        return self._assembled(form, values, cuts, places)
 
-    def _assembled(self, form: Assembler, values: np.ndarray, pieces: int, places: Places) -> np.ndarray:
-        mine, local = self._form(form, pieces), np.tile(values, (pieces, 1, 1))
-        for rows, basis in self._bases(pieces):
-            local[..., rows] = self._by_nodes(basis, values[None, :, rows])
-        out = np.zeros_like(local)
+    def _assembler(self, form: Assembler, *cuts: int) -> Assembler:
+        cells = self._cells(*cuts)
+        load = int(cells.dofs[0, self._load])
+        return Assembler(form.form, cells, self.equations.known.cut(*cuts), load, inside=True)
+
+    def _assembled(self, form: Assembler, values: np.ndarray, cuts: tuple[int, ...], places: Places) -> np.ndarray:
+        mine, bases = self._form(form, *cuts), self._bases(*cuts)
+        local = [values[:, rows].reshape(-1, rows.shape[1]) @ basis.swapaxes(1, 2) for rows, basis in bases]
+        out, whole = np.zeros(sum(cuts) * values.size), np.empty((sum(cuts), *values.shape))
         mine.constants = form.constants
-        mine.add(local.ravel(), places, out.ravel())
-        for rows, basis in self._bases(pieces):
-            out[..., rows] = self._by_nodes(basis.swapaxes(1, 2), out[..., rows])
-        return out
+        mine.add(np.concatenate([part.ravel() for part in local]), places, out)
+        parts = np.split(out, np.cumsum([part.size for part in local])[:-1])
+        for (rows, basis), part, like in zip(bases, parts, local, strict=True):
+            whole[..., rows] = (part.reshape(like.shape) @ basis).reshape(-1, len(values), *rows.shape)
+        return whole
 
-    @staticmethod
-    def _by_nodes(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Sums (pieces, cells, nodes, size) over the nodes of ``values``, all cells of a piece at once."""
-        _, cells, nodes, size = values.shape
-        sums = basis @ values.swapaxes(1, 2).reshape(len(values), nodes, cells * size)
-        return sums.reshape(len(basis), nodes, cells, size).swapaxes(1, 2)
-
-    def _cut(self, pieces: int) -> Cells:
-        ends = (np.arange(pieces)[:, None] + np.array([0.0, 1.0])) / pieces
+    def _cut(self, *cuts: int) -> Cells:
+        """All pieces: their values are by field, piece, cell and component, and those of the nodes side by side."""
+        ends = np.concatenate([(np.arange(n)[:, None] + np.array([0.0, 1.0])) / n for n in cuts])
         first, size = self._x[:, :1], self._x[:, 1:] - self._x[:, :1]
         x = first + size * ends[:, None, :, None]
-        dofs = np.arange(pieces * self.dofs.size, dtype=np.int32).reshape(-1, self.dofs.shape[1])
-        return Cells(np.ascontiguousarray(x.reshape(-1, 2, 3)), dofs)
+        dofs, known = np.empty((len(ends), *self.dofs.shape), dtype=np.int32), 0
+        for rows, _ in self._bases(*cuts):
+            shape = *dofs.shape[:2], *rows.shape
+            dofs[..., rows] = np.arange(known, known := known + int(np.prod(shape)), dtype=np.int32).reshape(shape)
+        return Cells(np.ascontiguousarray(x.reshape(-1, 2, 3)), dofs.reshape(-1, dofs.shape[-1]))
 
-    def _tabulated(self, pieces: int) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each field the rows (nodes, size), and its basis at the nodes of pieces, (pieces, nodes, nodes)."""
-        return [(self.rows[x.name], compat.basis_on_pieces(x.degree, pieces)) for x in self.fields.blocks]
+    def _tabulated(self, *cuts: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each field the rows (size, nodes), and its basis at the nodes of pieces, (pieces, nodes, nodes).
+
+        Scalars come last, as a field of one node.
+        """
+        out, scalar = list[tuple[np.ndarray, np.ndarray]](), np.ones(self.dofs.shape[1], dtype=bool)
+        for x in self.fields.blocks:
+            rows = self.rows[x.name].T
+            out.append((rows, np.concatenate([compat.basis_on_pieces(x.degree, n) for n in cuts])))
+            scalar[rows] = False
+        return [*out, (np.flatnonzero(scalar)[:, None], np.ones((sum(cuts), 1, 1)))]
 
 
 class QuadratureCheck:
@@ -203,9 +213,9 @@ class QuadratureCheck:
         state, elements, number = self.system.at(x), self.system.fields.discretization.elements, self._pieces.number
         self.system.equations.take(state.line)
         values = [local[self._pieces.dofs] for local in (state.local, self._moved(state.local))]
-        fine = self._terms(values, number)
+        *coarse, fine = np.split(self._terms(values, 1, 2, 3, number), np.cumsum([1, 2, 3]), axis=1)
         true, size = fine.sum(axis=1), abs(fine).sum(axis=1)
-        off = [self._terms(values, pieces).sum(axis=1) - true for pieces in (1, 2, 3)]
+        off = [terms.sum(axis=1) - true for terms in coarse]
         found = []
         for rows in self._rows.values():
             first, second, third, sizes = (abs(y[..., rows]).max(axis=2) for y in (*off, size))
@@ -264,13 +274,13 @@ class QuadratureCheck:
         """Largest absolute value in each of some arrays, of all ranks."""
         return np.max(self.system.comm.allgather([abs(x).max() for x in values]), axis=0)
 
-    def _terms(self, values: list[np.ndarray], pieces: int) -> np.ndarray:
+    def _terms(self, values: list[np.ndarray], *cuts: int) -> np.ndarray:
         """What is compared: the residual, its change by the motion, inertia; (terms, pieces, cells, n)."""
         equations = self.system.equations
-        first, moved = (self._pieces.vectors(equations.residual, x, pieces) for x in values)
+        first, moved = (self._pieces.vectors(equations.residual, x, *cuts) for x in values)
         if equations.even:
             return np.array([first, moved - first])
-        return np.array([first, moved - first, self._pieces.rigid(equations.kinetic, values[0], pieces)])
+        return np.array([first, moved - first, self._pieces.rigid(equations.kinetic, values[0], *cuts)])
 
     def _moved(self, local: np.ndarray) -> np.ndarray:
         """Local values after a small motion, with no curvature at one place of the rod and no strain at another."""

@@ -97,12 +97,15 @@ class TableFunctions:
                 )
         return ""
 
-    def cut(self, pieces: int) -> TableFunctions:
-        """The same on equal pieces of this rank's elements, those of the first piece of all elements before others."""
+    def cut(self, *cuts: int) -> TableFunctions:
+        """The same on equal pieces of this rank's elements, those of the first piece of all elements before others.
+
+        The pieces of several cuts, with the given numbers of pieces each, come one cut after the other.
+        """
         out, own = copy(self), self.along[: self._fields.owned_cells]
         values = own.reshape(len(own), self._degree + 1, -1)
-        cut = compat.basis_on_pieces(self._degree, pieces)[:, None] @ values
-        out.along = cut.reshape(pieces * len(values), -1)
+        cut = np.concatenate([compat.basis_on_pieces(self._degree, n) for n in cuts])[:, None] @ values
+        out.along = cut.reshape(sum(cuts) * len(values), -1)
         return out
 
     def _at_nodes(self, a: float, b: float, p: int) -> np.ndarray:
