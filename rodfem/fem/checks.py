@@ -102,8 +102,8 @@ class Convexity:
         Of one state alone they are too small where a strain has hardly any stiffness left: in units of these the other
         strains are the least eigenvalue almost everywhere, and hide it.
         """
-        diagonals = [abs(np.einsum("cpii->cpi", self._matrices(x))) for x in states]
-        return np.asarray(np.sqrt(np.max(diagonals, axis=0).max(axis=1, keepdims=True)))
+        diagonals = abs(np.diagonal(np.stack([self._matrices(x) for x in states]), axis1=-2, axis2=-1))
+        return np.asarray(np.sqrt(diagonals.max(axis=(0, 2))[:, None]))
 
     def margin(self, x: PETSc.Vec, scales: np.ndarray) -> float:
         """Least eigenvalue over the whole rod at ``x``, in units of the ``scales`` of states nearby: smooth."""
@@ -121,8 +121,12 @@ class Convexity:
         assert self.evaluate is not None
         state, evaluate = self.system.at(x), self.evaluate
         shape = self.system.fields.owned_cells, self.places, self.size, self.size
-        matrices = derived(state, evaluate, lambda: state.evaluate(evaluate).reshape(shape).copy())
-        return np.asarray((matrices + np.swapaxes(matrices, -1, -2)) / 2)
+
+        def symmetric() -> np.ndarray:
+            matrices = state.evaluate(evaluate).reshape(shape)
+            return np.asarray((matrices + matrices.swapaxes(-1, -2)) / 2)
+
+        return derived(state, evaluate, symmetric)
 
 
 class Pieces:
@@ -272,7 +276,8 @@ class QuadratureCheck:
 
     def _largest(self, values: Iterable[np.ndarray]) -> np.ndarray:
         """Largest absolute value in each of some arrays, of all ranks."""
-        return np.max(self.system.comm.allgather([abs(x).max() for x in values]), axis=0)
+        mine, comm = np.array([abs(x).max() for x in values]), self.system.comm
+        return mine if comm.size == 1 else np.max(comm.allgather(mine), axis=0)
 
     def _terms(self, values: list[np.ndarray], *cuts: int) -> np.ndarray:
         """What is compared: the residual, its change by the motion, inertia; (terms, pieces, cells, n)."""
