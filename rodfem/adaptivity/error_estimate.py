@@ -97,7 +97,7 @@ class OrdinateBound:
     def __init__(self, coarse: Shape, richer: Shape) -> None:
         self.coarse, self.richer = coarse, richer
         scene, fields = coarse.system.scene, coarse.system.fields
-        vertices = fields.all_vertices()
+        vertices = fields.all_vertices
         places = [p for p in scene.ordinate.places if not any(same_place(p, v, scene.length) for v in vertices)]
         tried = np.empty(0)
         for p in places:

@@ -104,7 +104,7 @@ class Meshes:
         for known in self.solvers:
             d = known.system.fields.discretization
             if known is not old and cost(fields, d.elements, d.degree) <= affordable:
-                if found.fulfilled_by(d, known.system.fields.all_vertices(), indicator):
+                if found.fulfilled_by(d, known.system.fields.all_vertices, indicator):
                     return known
         return self.add(mesh)
 

@@ -71,7 +71,7 @@ class Mirror:
     def __call__(self, shape: Shape, x: PETSc.Vec) -> PETSc.Vec:
         """Image of the state ``x``; drift scalars of the image are zero."""
         system, f, state = shape.system, shape.system.fields, shape.system.at(x)
-        named, ends = state.parts, sum(system.scene.interval) - f.all_vertices()[::-1]
+        named, ends = state.parts, sum(system.scene.interval) - f.all_vertices[::-1]
         for block in f.blocks:
             weights = self.weights(system, block.name)
             named[block.name] = state.values(block.name) * weights

@@ -221,7 +221,7 @@ class Fields:
                 given = end.clamps(block, c) if block.tangent is None else block.tangent[side]
                 found.append(at_end[:, np.broadcast_to(given, block.size)].ravel())
         for block in (b for b in self.blocks if b.spare):
-            ends, x = self.all_vertices(), self.coordinates(block.degree)
+            ends, x = self.all_vertices, self.coordinates(block.degree)
             a, b = ends[len(ends) // 2 - 1 :][:2]
             middle = a + (b - a) * np.sort(compat.nodes(block.degree))[1]
             found.append(self.dofs[block.name][same_place(x, middle, self.scene.length)].ravel())
@@ -308,6 +308,7 @@ class Fields:
         function.x.scatter_forward()
         return np.array(function.x.array)
 
+    @cached_property
     def all_vertices(self) -> np.ndarray:
         """Arclengths at which elements meet, of all ranks in ascending order, (E + 1,)."""
         mine = self.vertices[: self.owned_cells, 0]

@@ -83,7 +83,7 @@ class TableFunctions:
 
     def rough(self) -> str:
         """Sentence on a table that varies within elements as the error bar's halves do not see it; empty for none."""
-        vertices, k = self._fields.all_vertices(), self._fields.discretization.degree
+        vertices, k = self._fields.all_vertices, self._fields.discretization.degree
         halves = np.sort(np.concatenate([vertices, (vertices[1:] + vertices[:-1]) / 2]))
         for table in self.tables:
             size = np.ptp(vertices) * (table.rows**2).mean()

@@ -297,7 +297,7 @@ def halved(degree: int) -> float:
 def richer(system: System) -> Discretization:
     """Halves of the elements of a system, of one degree more (but of the highest one)."""
     d = system.fields.discretization
-    halves = replace(d, vertices=tuple(map(float, system.fields.all_vertices())))
+    halves = replace(d, vertices=tuple(map(float, system.fields.all_vertices)))
     return halves.finer(2, richer=int(d.degree < HIGHEST))
 
 
@@ -315,7 +315,7 @@ def transferred(source: Shape, target: System, vector: PETSc.Vec, *, state: bool
     """A state, or (``state=False``) a direction, on another mesh: a direction is zero where a state is clamped."""
     old, new = source.system.fields, target.fields
     values = (source.system.at(vector) if state else source.system.change(vector)).local
-    out, ends = np.zeros(len(new.number)), old.all_vertices()
+    out, ends = np.zeros(len(new.number)), old.all_vertices
     for block in new.blocks:
         table = source.from_left(values[source.natural[block.name]])
         out[new.dofs[block.name]] = interpolated(table, ends, new.coordinates(block.degree))
