@@ -255,7 +255,7 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
     add("--range", dest="span", type=float, nargs=2, metavar=("A", "B"), help=words)
     words = f"compute every branch also at exactly these values of {load}"
     add("--at", type=float, nargs="+", metavar="LOAD", help=words)
-    words = "largest step along a branch, in radian of rotation (root mean square; default: the file's own, or 0.2)"
+    words = "largest step along a branch, in radian of rotation (root mean square; default: the file's own, or 0.15)"
     add("--step", dest="largest", type=float, metavar="S", help=words)
     words = "follow what leaves from branch points of branches of a depth less than D; the first branch has depth 0, "
     words += "what leaves from it 1, and so on (default: the file's own, or 2)"

@@ -46,7 +46,7 @@ class StepControl:
     """Steps by the size of the correction, in the metric (root mean square rotation in radian, load over its span)."""
 
     first: float = 0.02  #: length of the first step
-    largest: float = 0.2  #: bound of the step, which is also how coarse a branch is drawn
+    largest: float = 0.15  #: bound of the step, which is also how coarse a branch is drawn
     smallest: float = 1e-5  #: length of a step at which a branch is given up
     aim: float = 1e-2  #: distance from prediction to correction that is aimed at
     most: int = 2000  #: number of points at which a branch is given up

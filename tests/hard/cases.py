@@ -168,7 +168,7 @@ BIFURCATIONS = (
         POINTS,
         "two to four branch points in two planes, at random", "several in a step, in either direction, at a row, or "
         "two at one load", SAID, "Euler, pi^2/4, times functions with given zeros", "number of a random draw",
-        planes.crossings, (70072, 3), tuple(range(60)),
+        planes.crossings, (70072, 93209), tuple(range(60)),
     ),
     Case(
         POINTS,
