@@ -12,10 +12,10 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 31760,
-    "files of Python": 145,
+    "lines of Python": 32307,
+    "files of Python": 148,
     "lines of C": 957,
-    "module constants with a number": 237,
+    "module constants with a number": 248,
     "functions of a complexity above 10": 0,
     "functions of six parameters or more": 18,
     "places that warn": 24,
