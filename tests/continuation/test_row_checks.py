@@ -66,7 +66,7 @@ def test_mutations_are_caught(formulation: str) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("steps", [StepControl(), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
+@pytest.mark.parametrize("steps", [StepControl(largest=0.1), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
 def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
     """States of another branch at nearly the same load, farther than a step away, in place of the last row.
 
