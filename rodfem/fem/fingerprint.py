@@ -57,11 +57,11 @@ def _numbers(shape: Shape, mass: PETSc.Mat, load: float, units: PETSc.Vec) -> li
     state.residual(residual)
     residual.pointwiseMult(residual, units)
     mass.zeroEntries()
-    state.assemble_into(mass, system.equations.kinetic)
+    if not system.equations.massless:  # dolfinx has no form of nothing
+        state.assemble_into(mass, system.equations.kinetic)
     mass.assemble()
-    kinetic, potential = (mass * change).dot(change).real / 2, system.equations.potential
-    kinetic = kinetic if system.scene.inertia.order == 2 else -kinetic
-    energy = float("nan") if potential is None else state.integral(potential)
+    kinetic = (mass * change).dot(change).real / (2 if system.scene.inertia.order == 2 else -2)
+    energy = state.integral(system.equations.potential) if system.equations.potential is not None else float("nan")
     return [residual.norm(), state.energy(), shape.ordinate(x), kinetic, energy]
 
 
