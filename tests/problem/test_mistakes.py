@@ -210,7 +210,7 @@ PLANS: list[tuple[Callable[[], Any], str]] = [
     (lambda: Discretization(elements=10**9), "too large"),
     (lambda: Discretization(elements=8.0), "elements is 8.0: give a whole number, as in elements=8"),  # type: ignore[arg-type]
     (lambda: Discretization(elements=1, vertices=("0", "1")), r"vertices\[0\] is '0': give a number"),  # type: ignore[arg-type]
-    (lambda: control(largest="0.1"), "largest is '0.1': give a number, as in largest=0.2"),
+    (lambda: control(largest="0.1"), "largest is '0.1': give a number, as in largest=0.15"),
     (lambda: control(most=0), "most is 0: a branch has at least one point"),
     (lambda: Plan(at=0.5), "at is 0.5: give a tuple of numbers"),  # type: ignore[arg-type]
     (lambda: Plan(depth=-1), "-1 is not a depth"),
