@@ -424,7 +424,7 @@ TABLE = {
     },
     "rodfem/fem/fingerprint.py": {
         "rods-of-another-inertia-are-one": (
-            "(mass * change).dot(change).real / 2", "0.0", "diagram/test_another_rod.py"),
+            "(mass * change).dot(change).real / (2", "0.0 / (2", "diagram/test_another_rod.py"),
         "rods-that-differ-inside-the-range-are-one": (", *inside(own)] + (", "] + (", "diagram/test_another_rod.py"),
     },
     "rodfem/fem/form_compiler.py": {

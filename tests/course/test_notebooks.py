@@ -24,7 +24,7 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def notebooks(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     written = runpy.run_path(str(HOME / "tools" / "notebooks.py"))["write"](tmp_path_factory.mktemp("notebooks"))
-    assert isinstance(written, list) and len(written) == 10
+    assert isinstance(written, list) and len(written) == 11
     return written
 
 
@@ -41,7 +41,7 @@ def execute(path: Path, python: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([python, "-c", program, str(path)], env=env, cwd=path.parent, capture_output=True, text=True)
 
 
-@pytest.mark.parametrize("number", range(10))
+@pytest.mark.parametrize("number", range(11))
 def test_a_notebook_runs(number: int, notebooks: list[Path]) -> None:
     done = execute(notebooks[number], sys.executable)
     assert done.returncode == 0, done.stderr[-2000:]
