@@ -286,8 +286,8 @@ def test_a_bar_is_no_less_than_the_location_and_a_law_of_another_kind_has_none()
     poor = replace(special, located_to=1e-3)
     richer.estimate(poor)
     assert poor.error_estimate == 1e-3
-    (_, origin, rho) = richer.origins[0]
-    richer.origins = [(poor, origin, rho)]
+    ((_, origin),) = richer.origins
+    richer.origins = [(poor, origin)]
     richer.law(poor, way, own := replace(law, kind="pitchfork"))
     richer.law(poor, way, other := replace(own, power=own.power + 1))
     assert own.uncertainty < 1e-3
