@@ -36,7 +36,7 @@ from rodfem.problem.functions import derived
 from rodfem.stability.reduced_stiffness import DIFFERENCE
 from rodfem.tolerances import TINY
 
-DIFFERENCES = ((-2e-3, 1e3 / 12), (-1e-3, -2e3 / 3), (1e-3, 2e3 / 3), (2e-3, -1e3 / 12))
+DIFFERENCES = [(1e-3 * step, weight / 2e-3) for step, weight in SHARP]
 """Places and weights of a central difference of the fourth order: along a null vector, in a parameter over its size."""
 
 
