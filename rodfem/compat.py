@@ -40,6 +40,11 @@ except ModuleNotFoundError as missing:
         "3.12 or newer), or use the Python of 'make setup' (.venv/bin/python), which sees Debian's python3-dolfinx."
     ) from missing
 
+if np.issubdtype(PETSc.ScalarType, np.complexfloating):
+    raise SetupError(
+        "This PETSc was built for complex numbers, where MUMPS counts no inertia: unset PETSC_DIR and SLEPC_DIR, or "
+        "point both at the build for real numbers."
+    )
 
 REAL: Any = np.float64  # numbers of states and forms, whatever those of PETSc
 _FOR = hashlib.sha1(code_cache.processor().encode()).hexdigest()[:16]
@@ -61,19 +66,8 @@ _OPTION_FILES = [
     if hasattr(module, name)
 ]
 """Functions that read options from files, each with its module."""
-COMPLEX = bool(np.issubdtype(PETSc.ScalarType, np.complexfloating))
-"""Whether this PETSc was built for complex numbers: forms and states are real all the same."""
 KINDS = CELL, BOUNDARY, INTERIOR = 1, 2, 4
 """Numbers that an entity of an integral has: cell; cell and facet; cell and facet on either side."""
-
-
-def require_real_petsc() -> None:
-    """Raise :class:`SetupError` on a PETSc with complex numbers, where a saddle matrix has no inertia."""
-    if COMPLEX:
-        raise SetupError(
-            "This PETSc was built for complex numbers, where MUMPS counts no inertia: under a load with a potential "
-            "rodfem needs the real one; unset PETSC_DIR and SLEPC_DIR, or point both at the real build."
-        )
 
 
 def interval_mesh(comm: Any, elements: int, a: float, b: float) -> Any:
@@ -167,27 +161,6 @@ def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
 def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:
     """Coordinates of the vertices of each local cell, in reference order: (cells, 2, 3)."""
     return np.asarray(mesh.geometry.x)[_vertices(mesh, cells)]
-
-
-def assemble_matrix(matrix: PETSc.Mat, form: Any, rows: np.ndarray, columns: np.ndarray) -> None:
-    """Add a real form to a PETSc matrix, without the final exchange between ranks."""
-    if not COMPLEX:
-        fem.petsc.assemble_matrix(matrix, form)
-        return
-    shape = (len(rows), len(columns))
-    table = local_table(form)
-    entries = table[: shape[0], : shape[1]].tocoo()
-    row, column = rows[entries.row], columns[entries.col]
-    kept = (row >= 0) & (column >= 0)
-    used, row = np.unique(row[kept], return_inverse=True)
-    summed = sp.csr_matrix((entries.data[kept], (row, column[kept])), shape=(len(used), matrix.getSize()[1]))
-    matrix.setValuesIJV(
-        summed.indptr.astype(PETSc.IntType),
-        summed.indices.astype(PETSc.IntType),
-        summed.data.astype(PETSc.ScalarType),
-        addv=True,
-        rowmap=used.astype(PETSc.IntType),
-    )
 
 
 def local_table(form: Any) -> sp.csr_matrix:

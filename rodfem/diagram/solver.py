@@ -11,7 +11,6 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import compat
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.continuation.branch import Point, SpecialPoint
@@ -73,8 +72,6 @@ class Solver:
         ``clock`` notes times.  Raises :class:`~rodfem.errors.InputError` for a ``discretization`` that does not fit.
         """
         Plan(scene.span, spectrum=spectrum).check(scene, discretization or Discretization())
-        if scene.conservative:
-            compat.require_real_petsc()
         if form_compiler.ALONE:
             compile_ahead("linalg/chain", "fem/assembly", "fem/newton")
         system = System(scene, discretization or Discretization(), comm, clock)

@@ -316,8 +316,8 @@ class Fields:
 
     @property
     def compiled(self) -> bool:
-        """Whether compiled code assembles matrices: of real numbers on one rank, unless PETSc is asked for."""
-        return self.comm.size == 1 and not compat.COMPLEX and self.discretization.factors == CHAIN
+        """Whether compiled code assembles matrices: on one rank, unless PETSc is asked for."""
+        return self.comm.size == 1 and self.discretization.factors == CHAIN
 
     @property
     def chain_size(self) -> int:

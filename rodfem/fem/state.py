@@ -227,7 +227,7 @@ class State(NodalValues):
             matrix.stateIncrease()
         else:
             self._register()
-            compat.assemble_matrix(matrix, form.form, *self.system.maps(load))
+            compat.fem.petsc.assemble_matrix(matrix, form.form)
 
     def factor(self, row: PETSc.Vec, damping: float = 0.0) -> None:
         """Factor the Jacobian, with ``damping`` times the metric added, for :meth:`System.solve`."""

@@ -8,7 +8,6 @@ a rod that is bent before a load presses on its crown: it stands.
 
 from __future__ import annotations
 
-import argparse
 import os
 import subprocess
 import sys
@@ -355,15 +354,25 @@ def snapshot(
 
 # --- in processes
 
+PROGRAM = "import sys; from rodfem.output.render import drawn; sys.exit(drawn(*sys.argv[1:]))"
+
+
+def drawn(states: str, branch: str, row: str, path: str, caption: str) -> str | None:
+    """Draw as :func:`draw_shape` does; a sentence on what failed, else None."""
+    try:
+        draw_shape(Path(states), branch, int(row), Path(path), caption=caption)
+    except (ImportError, RuntimeError, ValueError, OSError) as error:
+        return str(error).split("\n", 1)[0]
+    return None
+
 
 def draw_shape_safely(states: Path, branch: str, row: int, path: Path, caption: str) -> str:
-    """Draw as `draw_shape` does, in a process of its own, which may crash; returns a sentence on what failed."""
-    command = [sys.executable, "-P", "-m", "rodfem.output.render", str(states), f"--branch={branch}", f"--row={row}"]
-    command += [f"--output={path}", f"--caption={caption}"]
+    """Draw as :func:`draw_shape` does, in a process of its own, which may crash; a sentence on what failed."""
     mpi = ("OMPI_", "PMI", "MPI_LOCAL")  # beginnings of names, PMI_ and PMIX_ alike
     environment = {key: value for key, value in os.environ.items() if not key.startswith(mpi)}
     home = str(Path(__file__).resolve().parents[2])
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH")]))
+    command = [sys.executable, "-P", "-c", PROGRAM, str(states), branch, str(row), str(path), caption]
     try:
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120.0)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -372,21 +381,3 @@ def draw_shape_safely(states: Path, branch: str, row: int, path: Path, caption: 
         return f"drawing {path} crashed with signal {-done.returncode}: {LIBRARIES}"
     reason = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
     return f"drawing {path} failed: {reason}" * bool(done.returncode)
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Draw the shape named on the command line, that of the process by default; one sentence, and status 1, if not."""
-    parser = argparse.ArgumentParser(prog="python -m rodfem.output.render", description="Draw a rod in space.")
-    parser.add_argument("states", type=Path, help="states.h5 of a scene")
-    parser.add_argument("--branch", required=True, help="name of the branch")
-    parser.add_argument("--row", required=True, type=int, help="row of the state, counted from 0")
-    parser.add_argument("--output", dest="path", type=Path, default=Path("shape.png"), help="picture to write")
-    parser.add_argument("--caption", help="line at the foot of the picture")
-    try:
-        print(draw_shape(**vars(parser.parse_args(arguments))))
-    except (ImportError, RuntimeError, ValueError, OSError) as error:
-        sys.exit(str(error).split("\n", 1)[0])
-
-
-if __name__ == "__main__":
-    main()

@@ -11,7 +11,6 @@ from hemitropic_cases import run_demo
 from mpi4py import MPI
 
 from rodfem.diagram import solver
-from rodfem.output import render
 
 HOME = Path(__file__).parents[2]
 
@@ -87,18 +86,6 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
         assert out == "" or (line in AFTER_SET_UP and out.startswith("Compiling the forms for the first time"))
     else:
         assert out == err == ""
-
-
-@pytest.mark.parametrize(
-    ("main", "line", "words"),
-    [
-        (render.main, "/nonexistent --branch a --row 0 --output a.foo", "unknown format"),
-        (render.main, "/etc/passwd --branch a --row 0", "cannot read"),
-    ],
-)
-def test_programs_that_draw(main, line: str, words: str) -> None:
-    with pytest.raises(SystemExit, match=words):
-        main(shlex.split(line))
 
 
 @pytest.mark.parametrize(
