@@ -104,8 +104,6 @@ TABLE = {
         "locus-of-a-mean-with-the-bar-of-one": ("split = SPLIT * found.spread", "split = 0.0 * found.spread", LOCI),
         "flutter-locus-of-a-mean-with-the-bar-of-one": ("apart = SPLIT * split", "apart = 0.0 * split", LOCI),
         "flutter-locus-of-a-mean": ("if split > FEWER * large:", "if False:", LOCI),
-        "a-locus-drops-symmetries-for-good": (
-            "verification.dropped, verification.notices = dropped, notices", "pass", IN_WORDS),
         "locus-through-an-imperfection": ("curve.part > IMPERFECT", "curve.part > 1e9", LOCI),
         "flutter-locus-by-eigenvalues-alone": ("step = -here / slope\n                t += step", "step = 0.0", LOCI),
     },

@@ -145,14 +145,12 @@ class Plane:
 
 @contextmanager
 def restoration(system: System) -> Iterator[None]:
-    """Restore on exit all that a locus changes: the line of parameters, phase conditions, symmetries."""
-    verification = system.verification
-    before, dropped, notices = (system.line, system.phase), {*verification.dropped}, [*verification.notices]
+    """Restore on exit all that a locus changes: the line of parameters, phase conditions."""
+    before = system.line, system.phase
     try:
         yield
     finally:
         system.line, system.phase = before
-        verification.dropped, verification.notices = dropped, notices
 
 
 def predict(nodes: list[LocusPoint], s: float) -> Prediction:

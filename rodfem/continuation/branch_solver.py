@@ -377,8 +377,8 @@ class BranchSolver:
         return x, outcome
 
     def notices(self) -> list[str]:
-        """Sentences for the record that nobody has read: symmetries that were none, factors by the last resort."""
-        out = self.system.verification.read()
+        """Sentences for the record that nobody has read: factors by the last resort."""
+        out = list[str]()
         for factors in [self.system.lu, self.inertia.factors] if self.conservative else [self.system.lu]:
             if isinstance(factors, Chain) and factors.times:
                 out.append(

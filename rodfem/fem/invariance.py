@@ -1,4 +1,4 @@
-r"""Detection of the continuous symmetries of a scene, by invariance of its equations, and their verification.
+r"""Detection of the continuous symmetries of a scene, by invariance of its equations.
 
 A combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.fem.symmetries` is a symmetry where the equations
 ``F`` of equilibrium are equivariant, so that it carries equilibria into equilibria, for ``g(x) = A x + c`` ::
@@ -14,28 +14,19 @@ that holds it, the spring is round-off in ``F``.
 The motion of a closed rod along itself is a symmetry where no equation has the arclength in it.  Where one has, it may
 still be one together with a rotation (a ring under a dead radial load): ``g``, with the state's derivative in it, has
 to leave the functional ``L`` invariant, ``dL(x)[g(x)] = 0``, on a fine mesh, which has such a symmetry up to its error.
-
-A symmetry is verified wherever the second variation ``S`` is assembled: at an equilibrium ``S g = 0``.  A random
-combination of all generators is tried, which costs one product with ``S``.  What is left must be round-off, relative to
-``|S| |g|``, and so must the quotient ``g.(S g + A^t F) / g.M g``, which is the eigenvalue that the symmetry explains:
-that of its own terms, whatever the stiffest strain is.  A ring is closed by multipliers that are no part of a
-generator: what is left is taken across their columns.  A symmetry that fails is dropped, with a notice.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 
 from rodfem.errors import SceneError
-from rodfem.fem.state import LOAD, NodalValues, State
-from rodfem.fem.symmetries import SYMMETRIC_STATE, Symmetry, derivative, elementary_generators
-from rodfem.linalg.matrices import rounding
+from rodfem.fem.state import LOAD, NodalValues
+from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
 from rodfem.problem.contribution import Block, Motion
 from rodfem.problem.functions import derived
 from rodfem.problem.quaternions import directors, of_vector, product
@@ -44,7 +35,6 @@ from rodfem.tolerances import TINY
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
     from rodfem.fem.fields import Fields
-    from rodfem.fem.system import System
     from rodfem.problem.scene import Scene
 
 EXACT = 1e-10
@@ -336,106 +326,3 @@ def _turned(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndarray:
             clamp = turning.clamp(end.fixed_rotation, scene.start, s, scene.interval)
             values = (1 - at_end) * values + at_end * clamp
     return turning.normalised(values)
-
-
-class Verification:
-    """Verifies the symmetries of one :class:`~rodfem.fem.system.System` at states where ``S`` is assembled.
-
-    ``dropped`` are the places of those that were found to be none, ``notices`` a sentence on each that nobody has read
-    yet.  ``norm`` is that of ``S`` at the first state, to which residuals are relative.
-    """
-
-    def __init__(self, system: System) -> None:
-        self.system, self.norm = system, 0.0
-        self.dropped: set[int] = set()
-        self.notices: list[str] = []
-        self._closing: list[PETSc.Vec] | None = None
-        self._left, self._generator, self._none = system.new_vector(), system.new_vector(), np.zeros(len(system.drifts))
-
-    def __call__(self, matrix: PETSc.Mat, state: State) -> bool:
-        """Try the symmetries at an equilibrium, whose ``S`` is given; False where one of them was dropped."""
-        failed = self._failing(matrix, state, None)
-        if failed:  # the state may be no equilibrium: one that was carried over from another mesh
-            equations = self.system.new_vector()
-            state.residual(equations)
-            failed = self._failing(matrix, state, equations)
-        self.dropped |= {*failed}
-        self.notices += [
-            f"No symmetry is the {self.system.symmetries[i]}: it was taken for one, but is no null vector of the "
-            f"second variation at {self.system.scene.load} = {state.load:.6g}; it is left out from there on."
-            for i in failed
-        ]
-        return not failed
-
-    def _failing(self, matrix: PETSc.Mat, state: State, equations: PETSc.Vec | None) -> list[int]:
-        """Symmetries, by number, whose generators are no null vectors of ``S`` at the state.
-
-        The motion of a ring along itself is one of its mesh up to the mesh's error: it is not tried.
-        """
-        tried = [i for i, x in enumerate(self.system.symmetries) if i not in self.dropped and not x.along]
-        if not tried:
-            return []
-        self.norm = self.norm or self.system.matrix_in_units(matrix).norm(PETSc.NormType.INFINITY)
-        if self._holds(matrix, tried, state, equations):
-            return []
-        return [i for i in tried if not self._holds(matrix, [i], state, equations)]
-
-    def read(self) -> list[str]:
-        """Notices that nobody has read."""
-        out, self.notices = self.notices, []
-        return out
-
-    def _holds(self, matrix: PETSc.Mat, chosen: list[int], state: State, equations: PETSc.Vec | None) -> bool:
-        """Whether a generic combination of the ``chosen`` generators is a null vector of ``S`` at the ``state``."""
-        system, left, generators = self.system, self._left, state.generators
-        weights = generic_weights(len(chosen))
-        g, own = self._generator, generators.shape[1]
-        g.array[:own] = weights @ generators[chosen]
-        matrix.mult(g, left)
-        if system.has_scalars:
-            left.setValues(system.drifts, self._none)  # phase conditions, no part of S
-        left.assemble()
-        size, length = system.norm(g) ** 2, system.in_units(g, -1).norm()
-        if equations is not None:
-            pulled = system.generators.pulled_back(self._unloaded(state, equations))
-            left.array[:own] += weights @ pulled[chosen]
-        quotient = float(np.real(left.dot(g)))
-        # a generator of a hundredth of a unit rotation is small: the state has the symmetry itself, nearly
-        small = 1e-8 * self.norm * (length + 0.01)  # of S g, relative to |S| |g|
-        left = system.in_units(left, 1)
-        if left.norm() > small:
-            self._across_closing(matrix, left)
-        # what Newton's method makes of a state; a generator below SYMMETRIC_STATE explains no eigenvalue
-        zero = 1e-10 * system.stiffness_scale * max(size, SYMMETRIC_STATE**2)  # relative to the lowest of bending
-        excess = abs(quotient) - zero
-        return left.norm() <= small and (excess <= 0 or excess <= 10 * rounding(matrix, g, g))
-
-    def _unloaded(self, state: State, equations: PETSc.Vec) -> PETSc.Vec:
-        """The equations without the forces of the drift scalars."""
-        if not state.drifts.any():
-            return equations
-        out = equations.copy()
-        for drift, phase in zip(state.drifts.tolist(), self.system.phase.pushes, strict=True):
-            if phase is not None and drift:
-                out.axpy(-drift, phase)
-        return out
-
-    def _across_closing(self, matrix: PETSc.Mat, left: PETSc.Vec) -> None:
-        """Project ``left`` across the columns of the multipliers that close a ring, in place."""
-        if self._closing is None:
-            fields, self._closing = self.system.fields, []
-            for unknown in fields.unknown_scalars:
-                if unknown.group.motion is Motion.CLOSING:
-                    column = self.system.new_vector()
-                    matrix.getColumnVector(fields.scalars[unknown.name], column)
-                    column = self.system.in_units(column, 1)
-                    column.normalize()
-                    self._closing.append(column)
-        for column in self._closing:
-            left.axpy(-column.dot(left), column)
-
-
-@cache
-def generic_weights(count: int) -> np.ndarray:
-    """Weights (count,) of a generic combination of as many generators."""
-    return np.random.default_rng(0).uniform(0.5, 1.0, count) * (-1.0) ** np.arange(count) if count > 1 else np.ones(1)

@@ -24,7 +24,6 @@ from rodfem.problem.functions import Constants
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations
-    from rodfem.fem.symmetries import Phase
     from rodfem.fem.system import System
     from rodfem.problem.scene import Scene
 
@@ -169,13 +168,12 @@ class NodalValues:
 class State(NodalValues):
     """State of a :class:`~rodfem.fem.system.System`, whose borders and matrices it uses; collective over its ranks.
 
-    ``drifts`` are its drift scalars, and ``phases`` its phase conditions by the symmetries that are left out.
+    ``drifts`` are its drift scalars.
     """
 
     def __init__(self, system: System, local: np.ndarray, drifts: np.ndarray, line: Line) -> None:
         super().__init__(system.equations, local, line)
         self.system, self.drifts = system, drifts
-        self.phases: dict[frozenset[int], Phase] = {}
 
     def residual(self, out: PETSc.Vec) -> None:
         """Equations and phase conditions into ``out``; the row of the load is left zero."""

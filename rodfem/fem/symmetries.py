@@ -3,7 +3,7 @@ r"""The continuous symmetries of a scene: infinitesimal motions of its state, an
 A rigid motion of space or of the cross-sections changes each field and group of scalars by one of a few elementary
 generators ``g_j`` (:mod:`rodfem.forms.symmetry`), linear or constant in its values; the motion of a closed rod along
 itself changes each field by its derivative in arclength.  A symmetry is a combination of them that carries equilibria
-into equilibria (:mod:`rodfem.fem.invariance` finds those of a scene, and verifies them at each state).
+into equilibria (:mod:`rodfem.fem.invariance` finds those of a scene).
 
 The symmetries form a linear space.  Those combinations ``g`` of their generators that vanish at a reference state
 ``x0`` are its own symmetries and have no phase condition.  The others, orthonormal in the metric ``M``, have one each,
@@ -49,8 +49,7 @@ SYMMETRIC_STATE = 1e-4
 
 Where symmetries are found an imperfection is round-off that is 1e-12 of the stiffest strain's terms: 1e-8 relative to a
 twist 1e4 times as stiff as bending.  At a state that it moves by 1e-8/mu, the eigenvalue mu of that motion is not zero:
-it is counted as it is down to 1e-8/SYMMETRIC_STATE.  At states that it moves farther the symmetry is verified
-to the round-off of its eigenvalue, and dropped.
+it is counted as it is down to 1e-8/SYMMETRIC_STATE.
 """
 
 
@@ -229,8 +228,7 @@ class Generators:
         self.system, self.motions = system, system.symmetries if motions is None else list(motions)
         scalars = fields.copies[0] if system.has_scalars else np.zeros(0, int)
         self._rows, self._columns = np.concatenate([fields.free_owned, scalars]), np.flatnonzero(fields.number >= 0)
-        self._linear = [motion.linear(fields) for motion in self.motions]
-        self._forth = self._stacked(self._linear)
+        self._linear = self._stacked([motion.linear(fields) for motion in self.motions])
         self._line: Line | None = None
 
     def _stacked(self, every: list[sp.csr_matrix]) -> sp.csr_matrix:
@@ -240,10 +238,6 @@ class Generators:
         size = every[0].shape[0]
         rows = (np.arange(len(every))[:, None] * size + self._rows).ravel()
         return sp.vstack(every, format="csr")[rows][:, self._columns]
-
-    @cached_property
-    def _transposes(self) -> sp.csr_matrix:
-        return self._stacked([A.T.tocsr() for A in self._linear])
 
     def _constant(self, state: State) -> np.ndarray:
         """``c`` of all generators, (count, own rows): with held ends and known forces it may vary with the load."""
@@ -265,13 +259,8 @@ class Generators:
         """All generators at a state, (count, own rows): see :meth:`vector`."""
         if not self.motions:
             return np.zeros((0, len(self._rows)))
-        linear = times(self._forth, state.local[self._columns])
+        linear = times(self._linear, state.local[self._columns])
         return linear.reshape(len(self.motions), -1) + self._constant(state)
-
-    def pulled_back(self, covector: PETSc.Vec) -> np.ndarray:
-        """``A^t y`` of all generators, (count, own rows)."""
-        own = self.system.gathered(covector)[: len(self._columns)]
-        return times(self._transposes, own).reshape(len(self.motions), -1)
 
     def vector(self, own: np.ndarray) -> PETSc.Vec:
         """Vector of the system with these own rows, without component along drifts."""
@@ -316,20 +305,18 @@ class Phase:
         return len(self.broken)
 
 
-def no_phase(system: System, reference: PETSc.Vec | None = None) -> Phase:
+def no_phase(system: System) -> Phase:
     """No active condition for any drift scalar of the ``system``."""
-    count, reference = len(system.drifts), None if reference is None else reference.copy()
-    return Phase({}, {}, np.zeros(count), {}, np.eye(count), reference, system.generators.vector)
+    count = len(system.drifts)
+    return Phase({}, {}, np.zeros(count), {}, np.eye(count), None, system.generators.vector)
 
 
-def phase_at(system: System, reference: PETSc.Vec, dropped: set[int]) -> Phase:
-    """Phase conditions at ``reference`` for the symmetries of the ``system``, but for those ``dropped``."""
+def phase_at(system: System, reference: PETSc.Vec) -> Phase:
+    """Phase conditions at ``reference`` for the symmetries of the ``system``, which has some."""
     count = len(system.symmetries)
-    if count == len(dropped):
-        return no_phase(system, reference)
     state: State = system.at(reference)
     images = system.weighed(state.generators)
-    combinations, sizes, least = _orthogonal(system, state, system.sum(state.generators @ images.T), dropped)
+    combinations, sizes, least = _orthogonal(system, state, system.sum(state.generators @ images.T))
     numbers = [i for i, (size, bound) in enumerate(zip(sizes, least, strict=True)) if size >= bound]
     kept = combinations[[i for i in range(len(sizes)) if i not in numbers]]
     if not numbers:  # a straight rod has all of them itself
@@ -357,21 +344,19 @@ def _generic_forces(system: System, rigid: Generators, state: State, numbers: li
     return np.asarray((generic[numbers][:, moving] / sizes[moving]) @ images[moving])
 
 
-def _orthogonal(
-    system: System, state: State, gram: np.ndarray, dropped: set[int]
-) -> tuple[np.ndarray, list[float], list[float]]:
+def _orthogonal(system: System, state: State, gram: np.ndarray) -> tuple[np.ndarray, list[float], list[float]]:
     """Weights of combinations of the generators at a ``state`` that are orthogonal in the metric, sizes, and bounds.
 
     ``gram`` (count, count) are the products of the generators; one that is smaller than its bound is zero.
     """
     symmetries, count = system.symmetries, len(system.symmetries)
-    exact = [i for i, s in enumerate(symmetries) if not s.along and i not in dropped]
+    exact = [i for i, s in enumerate(symmetries) if not s.along]
     squares, combinations = gram.diagonal()[exact], np.eye(count)[exact]
     if len(exact) > 1:
         squares, turn = np.linalg.eigh(gram[np.ix_(exact, exact)])
         combinations[:, exact] = turn.T
     sizes, least = [sqrt(max(x, 0.0)) for x in squares.tolist()], [SYMMETRIC_STATE] * len(exact)
-    if symmetries[-1].along and count - 1 not in dropped:
+    if symmetries[-1].along:
         # of the motion along itself only what the exact symmetries do not do as well
         rest = np.eye(count)[-1]
         for weights, size in zip(combinations, sizes, strict=True):

@@ -26,7 +26,7 @@ from rodfem import compat
 from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_pattern, new_matrix, vector_places
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import FEW, Discretization
-from rodfem.fem.invariance import Verification, find_motion_along, find_symmetries
+from rodfem.fem.invariance import find_motion_along, find_symmetries
 from rodfem.fem.newton import compiled_newton
 from rodfem.fem.state import LOAD, Line, NodalValues, State
 from rodfem.fem.symmetries import (
@@ -101,7 +101,6 @@ class System:
         self.generators = Generators(self)
         self.rigid = self._rigid()
         self.phase = no_phase(self)
-        self.verification = Verification(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
         self.lu = factors_of("lu", comm, self.fields.chain_size, self.fields.dense_rows, self.natural_sizes)
         self.compiled = compiled_newton(self, self.matrix, self.lu)
@@ -317,19 +316,7 @@ class System:
         if reference is None:
             self.phase = no_phase(self)
         elif self.drifts and not (self.phase.reference is not None and self.phase.reference.equal(reference)):
-            phases, dropped = self.at(reference).phases, frozenset(self.verification.dropped)
-            if dropped not in phases:
-                phases[dropped] = phase_at(self, reference, self.verification.dropped)
-            self.phase = phases[dropped]
-
-    def verify(self, matrix: PETSc.Mat, state: State) -> bool:
-        """Verify the symmetries at an equilibrium; False, with other phase conditions, where one of them is none."""
-        if not self.symmetries or self.verification(matrix, state):
-            return True
-        reference = self.phase.reference
-        self.phase = no_phase(self)
-        self.set_phase(reference)
-        return False
+            self.phase = derived(self.at(reference), "phase", lambda: phase_at(self, reference))
 
     def drift(self, x: PETSc.Vec) -> float:
         """Greatest drift scalar of a state: zero, but for round-off, at an equilibrium."""

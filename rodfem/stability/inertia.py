@@ -93,16 +93,11 @@ class Inertia:
         self.compiled = compiled_newton(system, self.matrix, self.factors)
 
     def at(self, x: PETSc.Vec) -> Factored:
-        """Assemble ``S`` at an equilibrium ``x``, with its phase conditions, and verify the symmetries there."""
+        """Assemble ``S`` at an equilibrium ``x``, with its phase conditions."""
         self.system.set_phase(x)
         state = self.system.at(x)
         if not self._holds(state):
             self._assemble(x, state)
-            # a generator that is no null vector of S is no symmetry: verify drops its phase condition
-            with self.system.clock("stability"):
-                sound = self.system.verify(self.matrix, state)
-            if not sound:
-                self._assemble(x, state)
             self.filled += 1
             self._held = state, self.system.phase, self.matrix.stateGet()
         return Factored(self)
@@ -167,9 +162,8 @@ class Inertia:
         return REGULAR * self.scale + 10 * self.tolerance
 
     def forget_band(self) -> None:
-        """Settle the band of round-off, and that of symmetries, at the next state."""
+        """Settle the band of round-off at the next state."""
         self.resolution, self.tolerance, self._held = 0.0, ZERO_BAND * self.scale, None
-        self.system.verification.norm = 0.0
 
     @contextmanager
     def afresh(self) -> Iterator[None]:

@@ -104,7 +104,7 @@ def test_conditions_of_a_state_met_again_are_its_own(formulation: str) -> None:
     some = points[::9]
     for point in [*some, *some[:3], some[1], some[0], *some[::-1]]:
         system.set_phase(point.x)
-        anew = phase_at(system, point.x, set())
+        anew = phase_at(system, point.x)
         assert list(system.phase.rows) == list(anew.rows)
         for i, row in anew.rows.items():
             np.testing.assert_array_equal(system.phase.rows[i], row)

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 import ufl
 
-import rodfem.fem.system
-from rodfem import Discretization, Observer, Plan, Ring, Scene, Solver, StepControl, trace
+from rodfem import Discretization, Ring, Scene, Solver
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.fem.newton import relax
-from rodfem.fem.symmetries import Symmetry, elementary_generators
 from rodfem.fem.system import System
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.assessment import Assessor
@@ -118,27 +116,3 @@ def test_symmetries_of_a_loaded_ring(load: Any, potential: Any, motions: list[st
     names = [str(s) for s in System(scene, Discretization("pointwise", 8, 6)).symmetries]
     always = [f"translation along e{i}" for i in (1, 2, 3)] + ["turning of the cross-sections about d3"]
     assert sorted(names) == sorted(always + motions)
-
-
-@pytest.mark.long
-def test_a_false_symmetry_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The rotation of the ring is none: claimed, it is dropped at the first state, and said to be."""
-    found = rodfem.fem.system.find_symmetries
-
-    def more(equations: Any) -> list[Symmetry]:
-        parts = elementary_generators(equations.fields)
-        turn = np.array([float(p.name == "rotation about e2" or p.matrix[0][-1] == 1.0) for p in parts])
-        return [*found(equations), Symmetry(turn, parts)]
-
-    monkeypatch.setattr(rodfem.fem.system, "find_symmetries", more)
-    claimed: list[str] = []
-
-    class Ear(Observer):
-        def system(self, system: System, accuracy: float | None = None) -> None:
-            claimed.extend(map(str, system.symmetries))
-
-    plan = Plan((0.5, 3.0), depth=0, steps=StepControl(first=0.05, largest=0.15), error_bars=False)
-    diagram = trace(ring("e2"), Discretization("pointwise", 8, 6), plan, Ear())
-    assert "rotation about e2" in claimed
-    assert {(p.negative, p.zero) for p in diagram[0].points} == {(1, 2)}
-    assert sum("No symmetry is the rotation about e2" in sentence for sentence in diagram.warnings) == 1
