@@ -33,11 +33,36 @@ from rodfem.fem.state import line
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.functions import derived
-from rodfem.stability.reduced_stiffness import DIFFERENCE
+from rodfem.stability.reduced_stiffness import DIFFERENCE, bordered_of
 from rodfem.tolerances import TINY
 
 DIFFERENCES = [(1e-3 * step, weight / 2e-3) for step, weight in SHARP]
 """Places and weights of a central difference of the fourth order: along a null vector, in a parameter over its size."""
+
+
+def adjoint(
+    solver: BranchSolver, x: PETSc.Vec, states: SingularSystem
+) -> tuple[list[PETSc.Vec], list[list[PETSc.Vec]]]:
+    """Null vectors at a solution of ``states``; ``y`` (k, k), ``S y_ij = -D(S v_i) v_j`` across them, not at folds."""
+    inertia, bordered = solver.inertia, bordered_of(solver.inertia, len(states.phi))
+    bordered.factor(inertia.at(x).matrix, states.phi)
+    V, G = bordered.solve()
+    Z, N = states.split(G)
+    null = [combine(V, z) for z in Z.T]
+    if states.fold:
+        return null, []
+    images = [[solver.system.new_vector() for _ in null] for _ in null]
+    for v, row in zip(null, images, strict=True):
+        for step, weight in SHARP:
+            matrix = inertia.moved(x + v * (step * DIFFERENCE)).matrix
+            for image, other in zip(row, null, strict=True):
+                image.axpy(weight / (2 * DIFFERENCE), states.image(matrix, other))
+
+    def across(image: PETSc.Vec) -> PETSc.Vec:
+        (y, *_), forces = bordered.solve([-image])
+        return combine([y, *V], np.array([1.0, *(N @ states.rest(N, G, -forces[:, 0]))]))
+
+    return null, [[across(image) for image in row] for row in images]
 
 
 class Adjoint:
@@ -47,7 +72,7 @@ class Adjoint:
         """Take the null vectors at ``x``, a solution of ``states``."""
         self.solver, self.system, self.x, self.fold = solver, solver.system, x, states.fold
         self.values = dict(zip(self.system.scene.parameters, self.system.line.origin.tolist(), strict=True))
-        self.null, self.y = states.adjoint(x)
+        self.null, self.y = adjoint(solver, x, states)
         matrix = solver.inertia.at(x).matrix
         # rounding errors, independent, a hundred times, or all that is zero
         self._noise = [100.0 * rounding(matrix, v, x) + 1e-15 * solver.inertia.scale for v in self.null]  # round-off

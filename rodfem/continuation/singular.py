@@ -178,28 +178,6 @@ class SingularSystem:
         _, sides, *_ = self._modes(self.inertia.at(x).matrix)
         return sides[0], sides[-1]
 
-    def adjoint(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[list[PETSc.Vec]]]:
-        """Null vectors at a solution, and ``y`` (k, k), ``S y_ij = -D(S v_i) v_j`` across them; no ``y`` at folds."""
-        _, (V, *_), G, _ = self._modes(self._matrix(x, 0.0).matrix)
-        (Z, N), bordered = self._split(G), self._bordered[0]
-        null = [combine(V, z) for z in Z.T]
-        if self.fold:
-            return null, []
-        images = [[self.system.new_vector() for _ in null] for _ in null]
-        for v, row in zip(null, images, strict=True):
-            for step, weight in SHARP:
-                matrix = self._matrix(x + v * (step * DIFFERENCE), 0.0, moved=True).matrix
-                for image, other in zip(row, null, strict=True):
-                    image.axpy(weight / (2 * DIFFERENCE), self._image(matrix, other))
-        return null, [[self._across(bordered.solve([-y]), V, (N, G)) for y in row] for row in images]
-
-    def _across(
-        self, solved: tuple[list[PETSc.Vec], np.ndarray], V: Vectors, near: tuple[np.ndarray, np.ndarray]
-    ) -> PETSc.Vec:
-        """First solution of bordered equations, with what modes near by have of it."""
-        (y, *_), forces = solved
-        return combine([y, *V], np.array([1.0, *(near[0] @ self._rest(*near, -forces[:, 0]))]))
-
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
         """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""
         self._section = section
@@ -275,21 +253,21 @@ class SingularSystem:
         columns.insert(0, found.border.copy())
         residual = system.new_vector()
         system.at(x).residual(residual)
-        forces = [residual, *([] if old else columns)]
-        (s, *responses), sides, border, _ = self._modes(found.matrix, [-force for force in forces])
+        forces = [-force for force in (residual, *([] if old else columns))]
+        (s, *responses), sides, border, _ = self._modes(found.matrix, forces)
         V = sides[0]
         if old is not None:
             border = np.column_stack([border[:, 0], old.b, border[:, 1:]])
             at = replace(old, vectors=[s, *old.vectors[1 : -len(V)], *V], border=border)
         else:
             system.set_load(responses[0], 1.0)
-            Z, N = self._split(border[:, -len(V) :])
+            Z, N = self.split(border[:, -len(V) :])
             null, left = ([combine(side, z) for z in Z.T] for side in (V, sides[-1]))
             y, f = self._along_null(x, t, (null, left), sharp=sharp)
             at = _Linear([s, *responses, *V], border, columns, Z, N, left, y, f, border)
         return replace(at, rows=self._equations(x, at))
 
-    def _split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The modes that are to vanish, and the others: eigenvectors of G, by what they have of the last ones."""
         m, k = self.Z.shape
         if k == m:
@@ -322,7 +300,7 @@ class SingularSystem:
                     f[1] += share * left.dot(self._second(there, t))
                 found = self._matrix(there, t, moved=True)
                 f[0] += share * left.dot(found.border)
-                y.axpy(share, self._image(found.matrix, left))
+                y.axpy(share, self.image(found.matrix, left))
         return y, f
 
     def _work(self, x: PETSc.Vec, at: _Linear, trace: np.ndarray) -> np.ndarray:
@@ -336,7 +314,7 @@ class SingularSystem:
         for sign in (1.0, -1.0):
             found = self.inertia.moved(x + w * (sign * h))
             for image, left in zip(r, at.left, strict=True):
-                image.axpy(sign / (2 * h), self._image(found.matrix, left))
+                image.axpy(sign / (2 * h), self.image(found.matrix, left))
             bend.axpy(sign / (2 * h), found.matrix * w)
             bend.axpy(sign / (2 * h), found.border)
         self.system.set_load(bend, 0.0)
@@ -345,7 +323,7 @@ class SingularSystem:
         rows[:, 0] += constant
         return rows
 
-    def _image(self, matrix: PETSc.Mat, left: PETSc.Vec) -> PETSc.Vec:
+    def image(self, matrix: PETSc.Mat, left: PETSc.Vec) -> PETSc.Vec:
         """``S^t W``, which is known without a transpose where S is symmetric."""
         image = matrix.createVecRight()
         (matrix.mult if self.psi is self.phi else matrix.multTranspose)(left, image)
@@ -371,7 +349,7 @@ class SingularSystem:
 
     def _own(self, at: _Linear) -> np.ndarray:
         """Columns (3 + m, 3 + k) of ``s``, both parameters and the null vectors, which modes near by follow."""
-        moved = at.N @ self._rest(at.N, at.G, -at.border[:, :3])
+        moved = at.N @ self.rest(at.N, at.G, -at.border[:, :3])
         return np.block([[np.eye(3, 3 + self.count)], [moved, at.Z]])
 
     def _plane(self, at: _Linear, section: Section, moved: PETSc.Vec, t: float) -> np.ndarray:
@@ -395,7 +373,7 @@ class SingularSystem:
         if self._section is not None:
             curve = self._curve(share[:2], at, noise)
         others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z
-        response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self._rest(at.N, at.G, -at.b[:, 0]))]))
+        response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self.rest(at.N, at.G, -at.b[:, 0]))]))
         vectors = [v.copy() for v in null]
         orthonormalize(vectors, self.inertia.metric)
         parts = np.array([[wave.dot(v) for wave in self.inertia.waves(k)] for v in vectors])
@@ -439,7 +417,7 @@ class SingularSystem:
             self._negative(at.N) if self.psi is self.phi else -1,
         )
 
-    def _rest(self, N: np.ndarray, G: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    def rest(self, N: np.ndarray, G: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Amplitudes (m - k, ...) of modes near by under ``forces`` (m, ...); zero where nothing holds a mode."""
         G = N.T @ G @ N
         values, vectors = np.linalg.eigh((G + G.T) / 2)

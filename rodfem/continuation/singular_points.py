@@ -18,13 +18,11 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.crossings import Crossing, Node, cubic_value
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.continuation.singular import SingularState, SingularSystem, load_uncertainty
-from rodfem.errors import SMALLER_STEPS
 from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import combine, complement, orthonormalize
-from rodfem.stability.dependence import taut
 from rodfem.stability.inertia import Index
 from rodfem.stability.reduced_stiffness import SOFT
-from rodfem.tolerances import SAME_LOAD, round_off
+from rodfem.tolerances import round_off
 
 COUPLED = 1e-5
 """A fold has a cosine between null vector and load derivative above this, a branch point below."""
@@ -178,23 +176,3 @@ def _tangent(solver: BranchSolver, slope: PETSc.Vec, found: SingularState, *, fo
     tangent = combine(known, np.array([(system.metric * v).dot(slope) for v in known]))
     tangent.scale(1.0 / system.norm(tangent))
     return tangent
-
-
-def missing(a_load: float, b_load: float) -> str:
-    """Sentence on a crossing between two loads that no singular state was found for."""
-    return f"A special point between loads {a_load:.8g} and {b_load:.8g} was not located; {SMALLER_STEPS}."
-
-
-def taut_where_it_turns(solver: BranchSolver, x: PETSc.Vec) -> str:
-    """Sentence on a taut state ``x`` at which the load turns back through no special point; empty if it is not taut."""
-    if not taut(solver.shape, x):
-        return ""
-    scene, load = solver.system.scene, solver.system.scalar(x)
-    bound = min(scene.span, key=lambda bound: abs(load - bound))
-    at_end = abs(load - bound) < SAME_LOAD * abs(scene.span[1] - scene.span[0])
-    where = f"The range ends at {scene.load} = {bound:.8g}, where" if at_end else f"At {scene.load} = {load:.8g}"
-    return (
-        f"{where} the rod is taut: it cannot stretch, and any tension balances it; the branch turns back there, "
-        "through no special point, and what else leaves that state is not followed; end the range before it, or let "
-        "the rod stretch."
-    )

@@ -28,16 +28,16 @@ from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.continuation.singular_points import (
     Candidate,
     is_fold,
-    missing,
     of_crossing,
     of_miss,
     of_turn,
     solved,
     special_point,
-    taut_where_it_turns,
 )
+from rodfem.errors import SMALLER_STEPS
 from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import orthonormalize
+from rodfem.stability.dependence import taut_where_it_turns
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
 
 DIP = 0.1  # eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most
@@ -246,7 +246,8 @@ class SpecialSearch:
         loads, lost, self._lost = [s.point.load for s in branch.special if s.kind.singular], self._lost, []
         for a, b in lost:
             if not any((x - a.load) * (x - b.load) <= 0 for x in loads):
-                yield Remark(missing(a.load, b.load), a.load, b.load)
+                words = f"A special point between loads {a.load:.8g} and {b.load:.8g} was not located; {SMALLER_STEPS}."
+                yield Remark(words, a.load, b.load)
 
     def _dip(self, piece: Piece, p: Node, q: Node, *, found: bool) -> None:
         """Look for a branch point taken apart where the eigenvalue nearest zero is least at a row."""
@@ -297,7 +298,7 @@ class SpecialSearch:
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
         at = of_turn(piece, left, right, turn)
-        if why := taut_where_it_turns(solver, at.x):
+        if why := taut_where_it_turns(solver.shape, at.x):
             self.observer.warn(Remark(why, solver.system.scalar(at.x)))
             return None
         if left.index != right.index and is_fold(solver, at.x, at.null):

@@ -38,7 +38,7 @@ from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.pencil import Blocks, Pencil
-from rodfem.tolerances import NEGLIGIBLE
+from rodfem.tolerances import NEGLIGIBLE, SAME_LOAD
 
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
 TIGHT = "the rod cannot stretch and is taut, any tension balances it; begin where it is slack, or let it stretch."
@@ -86,6 +86,21 @@ def taut(shape: Shape, x: PETSc.Vec) -> bool:
     chord = (right - left) / scene.length
     held = [float(((end.fixed(state.constants()) @ chord) ** 2).sum()) for end in scene.sides]
     return min(held) > 1.0 - TAUT
+
+
+def taut_where_it_turns(shape: Shape, x: PETSc.Vec) -> str:
+    """Sentence on a taut state ``x`` at which the load turns back through no special point; empty if it is not taut."""
+    if not taut(shape, x):
+        return ""
+    scene, load = shape.system.scene, shape.system.scalar(x)
+    bound = min(scene.span, key=lambda bound: abs(load - bound))
+    at_end = abs(load - bound) < SAME_LOAD * abs(scene.span[1] - scene.span[0])
+    where = f"The range ends at {scene.load} = {bound:.8g}, where" if at_end else f"At {scene.load} = {load:.8g}"
+    return (
+        f"{where} the rod is taut: it cannot stretch, and any tension balances it; the branch turns back there, "
+        "through no special point, and what else leaves that state is not followed; end the range before it, or let "
+        "the rod stretch."
+    )
 
 
 def weak_combinations(pencil: Pencil, length: float) -> Iterator[tuple[float, np.ndarray]]:
