@@ -45,16 +45,7 @@ TABLE = {
     "rodfem/adaptivity/error_estimate.py": {
         "events-of-nodes-have-bars-of-ends": ("LEFT = 0.5", "LEFT = 0.0", "adaptivity/test_event_bars.py"),
         "bar-below-the-location": ("max(load_error, special.located_to)", "load_error", ERRORS),
-        "bar-of-another-law": ("if again is not None and alike(again, law):", "if again is not None:", ERRORS),
-        "bound-without-what-is-left": ("change + rho / (1 - rho) * max(change, about) + left", "change", ERRORS),
-        "bound-of-a-place-by-itself": ("max(change, about) + left", "change + left", ERRORS),
-        "richer-meshes-leave-a-tenth": ("min(2 * last /", "min(0.2 * last /", ERRORS),
-        "ordinates-are-located-exactly": ("left = STEADY * moved + round_off(", "left = round_off(", ERRORS),
-        "bound-is-a-tenth": ("change + rho / (1 - rho) * max(change, about) + left", "0.1 * change + left", ERRORS),
-        "every-state-is-resolved": (
-            "RESOLVED_TO = 0.1", "RESOLVED_TO = 1e9", "adaptivity/test_error_estimate.py hard/test_hard_cases.py"),
         "end-of-a-branch-is-too-sharp": ("else 0.25", "else 0.0025", "adaptivity/test_zero_stretch.py"),
-        "what-newton-leaves-is-nothing": ("left = STEADY * moved + ROUND_OFF", "left = ROUND_OFF", ERRORS),
     },
     "rodfem/adaptivity/grading.py": {
         "a-wave-that-is-even-on-its-elements-is-smooth": (
@@ -63,23 +54,11 @@ TABLE = {
     },
     "rodfem/adaptivity/soft_states.py": {
         "vanishing": ("_rank(metric, near.vectors, vanishing)", "_rank(metric, near.vectors, ())", AT_SPECIAL),
-        "changed-by-itself": (
-            "np.where(away > abs(coarse), left + away, left)", "np.where(contrary, left + away, left)", AT_SPECIAL),
-        "another-state": ("if soft and not again.resolved:", "if soft and again.changed < 0:", AT_SPECIAL),
-        "left-out-by-vectors": ("number + SPARE, NULL)[1]", "number + SPARE, NULL)[1][len(zeros) :]", AT_SPECIAL),
         "what-no-mesh-decides-is-refined-again": (
             "abs(finer) + of_mesh <= rounding", "abs(finer) < 0", "stability/test_soft_modes.py"),
         "all-that-is-undecided-is-within-round-off": (
             "abs(finer) + of_mesh <= rounding", "abs(finer) >= 0",
             "adaptivity stability/test_soft_modes.py diagram/test_at_special_points.py"),
-        "zeros-that-nobody-decided": (
-            "0.0 if self._richer else self.solver.inertia.tolerance", "0.0", "stability/test_soft_modes.py"),
-        "signs-that-are-the-mesh's-are-the-rod's": (
-            "return int(self._moved(point, found) if again.resolved else not fixed_load)", "return 0",
-            "stability/test_soft_modes.py"),
-        "another-state-confirms-an-index": (
-            'self.uncompared = "" if again.resolved else again.unlike(point.load)', 'self.uncompared = ""',
-            "stability/test_soft_modes.py"),
     },
     "rodfem/app/persons_file.py": {
         "modules-beside-a-file-come-first": (
@@ -102,10 +81,6 @@ TABLE = {
             "[: len(own) - size]\n    chosen = np.intersect1d(chosen, np.argsort(abs(spectrum.values))[:10])",
             "diagram/test_light_and_slow_rods.py"),
         "locus-of-a-mean-with-the-bar-of-one": ("split = SPLIT * found.spread", "split = 0.0 * found.spread", LOCI),
-        "flutter-locus-of-a-mean-with-the-bar-of-one": ("apart = SPLIT * split", "apart = 0.0 * split", LOCI),
-        "flutter-locus-of-a-mean": ("if split > FEWER * large:", "if False:", LOCI),
-        "locus-through-an-imperfection": ("curve.part > IMPERFECT", "curve.part > 1e9", LOCI),
-        "flutter-locus-by-eigenvalues-alone": ("step = -here / slope\n                t += step", "step = 0.0", LOCI),
     },
     "rodfem/codim2/follow.py": {
         "loci-follow-polynomials-beyond-bends": ("if failures < 2", "if failures < 200", "codim2/test_locus.py"),
@@ -114,14 +89,7 @@ TABLE = {
             "codim2/test_places.py"),
         "loci-have-bars-at-kinks": ("                error[row] = np.nan\n", "", "diagram/test_kinks.py"),
         "locus-across-a-gap": ("if node.orientation != last.orientation and not", "if False and not", LOCI),
-        "loci-of-unresolved-points-are-resolved": (
-            "doubtful=doubtful or special.resolved is False", "doubtful=False", LOCI),
         "rows-of-loci-are-resolved": ("<= RESOLVED_TO", "<= 1e9", IN_WORDS),
-        "every-crossing-of-loci-is-a-gap": (
-            "                return False\n        return True\n",
-            "                return False\n        return False\n", LOCI),
-        "bar-of-a-locus-without-what-is-left": (
-            "[bound(*pair, self.rho)", "[bound(*pair, 0.0)", "codim2/test_places.py"),
     },
     "rodfem/codim2/locus.py": {
         "stable-in-a-plane-is-stable": ('"planar": bool(scene.planar)', '"planar": False', IN_WORDS),
@@ -132,42 +100,19 @@ TABLE = {
     "rodfem/codim2/points.py": {
         "turning-points-by-differences": (
             "found.append((self._placed(turn, sought),", "found.append((turn,", "codim2/test_places.py"),
-        "bars-across-loci-only": (
-            "located = better.located_to + found.dp", "located = better.located_to", "codim2/test_places.py"),
-        "ends-of-folds-corrected": ("end = found.interpolated(node)", "end = replace(node)", "codim2/test_places.py"),
-        "double-zeros-by-their-sign": (
-            "len(end.modes) * (int(a.omega2 < 0) - int(end.omega2 < 0))", "0", "codim2/test_places.py"),
         "ends-of-folds-counted": ("dx=dx / size, s=s,", "dx=dx / size, s=s, rest=0,", "codim2/test_locus.py"),
         "a-fold-that-passes-a-branch-point-ends": (" and (a.dp * b.dp < 0)[moves].all()", "", LOCI),
-        "a-passage-is-a-cusp": ("if _coupling_vanishes(cusp, a, b, 1e-3):", "if False:", LOCI),
-        "cusps-are-turns": ("if p.curvature * q.curvature < 0:", "if False:", LOCI),
-        "cusps-hide-in-a-step": ("pairwise([a, *self._parts(a, b), b])", "pairwise([a, b])", LOCI),
-        "the-end-of-a-fold-has-no-bar": (
-            "np.maximum(abs(node.p - a.p), abs(node.p - b.p)) + a.located_to", "a.located_to", LOCI),
-        "a-gap-of-loci-is-a-crossing-for-sure": (
-            ", or turns back within {GAP:g} of the bounds from one", "", "codim2/test_places.py"),
     },
     "rodfem/continuation/arc.py": {
         "events-where-the-sign-changes-from-row-to-row-alone": (
             "if p.slope.item() * q.slope.item() < 0]", "if False]", "diagram/test_events.py"),
-        "events-know-no-round-off-of-states": (
-            "others = stepped(self.solver, x, self.row), x +", "others = x, x +", "diagram/test_events.py"),
-        "curves-turn-into-another-branch": ("dot(tangent) > ALIGNED", "dot(tangent) > 0.0", "diagram/test_events.py"),
         "convexity-is-looked-at-in-rows-alone": (
             "if margin(t) <= 0.0 and not holds(t):", "if margin(t) <= 0.0 and t == 1.0 and not holds(t):",
-            "continuation/test_convexity.py"),
-        "convexity-in-units-of-one-end": (
-            "convexity.scales(states[0], states[-1])", "convexity.scales(states[0])",
             "continuation/test_convexity.py"),
     },
     "rodfem/continuation/branch.py": {
         "bars-of-a-double-point-hold-for-one-load": (
             "max(q.error_estimate, apart + p.error_estimate)", "q.error_estimate", CHAIN),
-        "unresolved-points-are-merged-with-others": (
-            "s.resolved is not False for s in (p, q))", "True for s in (p, q))", CHAIN),
-        "two-passages-of-one-load-are-merged": ("for row in between)\n", "for row in ())\n", CHAIN),
-        "breaks-are-not-recorded": (
-            "if left[1] < right[0] or right[1] < left[0]:", "if left[1] < right[0] and right[1] < left[0]:", CHAIN),
     },
     "rodfem/continuation/branch_solver.py": {
         "stiffness-that-the-load-takes-away": (
@@ -177,15 +122,9 @@ TABLE = {
     "rodfem/continuation/crossings.py": {
         "no-pair-is-near-the-axis": (
             "AXIS, REAL = 0.4,", "AXIS, REAL = 0.0,", "continuation/test_reduced_stiffness.py"),
-        "the-cubic-is-the-branch": (
-            "off = SAFE * (b.s - a.s) ** 4 / 16 * size", "off = 0 * np.eye(len(a.H))",
-            "continuation/test_reduced_stiffness.py"),
     },
     "rodfem/continuation/eigenvalue_curves.py": {
         "location-is-blunt": ("SHARP, ENOUGH = 1e-11,", "SHARP, ENOUGH = 1e-4,", LOCATE),
-        "location-at-another-zero": ("np.argmin(abs(real))", "np.argmax(abs(real))", LOCATE),
-        "flutter-beside-the-collision": (
-            "abs(root) < 1 and uncertainty < best.uncertainty", "uncertainty < 10 * best.uncertainty", LOCATE),
     },
     "rodfem/continuation/first_equilibrium.py": {
         "states-that-cannot-be-counted": (
@@ -195,8 +134,6 @@ TABLE = {
         "first-states-without-forces": (
             "solver.at_load(_balanced(solver, guess), load)", "solver.at_load(guess, load)",
             "continuation/test_continuation.py"),
-        "a-far-state-leaves-its-round-off": (
-            "        solver.inertia.forget_band()", "        pass", "stability/test_round_off.py"),
     },
     "rodfem/continuation/follow.py": {
         "beyond-a-corner-the-tangent-is-that-before-it": (
@@ -209,9 +146,6 @@ TABLE = {
         "rows-of-another-branch-are-kept": (
             "defect(system, rows) <= UNEXPLAINED", "defect(system, rows) <= 1e9 * UNEXPLAINED",
             "continuation/test_row_checks.py"),
-        "a-defect-by-one-tangent": (
-            "known = [p for p in rows[-ROWS:] if", "known = [p for p in rows[-1:] if",
-            "continuation/test_row_checks.py"),
     },
     "rodfem/continuation/normal_form.py": {
         "pitchforks-by-their-loads": (
@@ -220,17 +154,9 @@ TABLE = {
         "pitchfork-opens-the-other-way": (
             "return NormalForm(PITCHFORK, best /", 'return NormalForm("pitchfork", -best /', ERRORS),
         "a-slope-hides-in-no-pitchfork": (" + hidden / abs(term.best) ** power", "", MIXED),
-        "transcritical-branches-go-to-the-other-side": (
-            "side = int(np.sign(load.best))\n", "side = -int(np.sign(load.best))\n", MIXED),
         "law-of-an-ordinate-that-says-nothing": (
             "return (QUADRATIC, quadratic, hidden / abs(quadratic.best)) if turns else None",
             "return QUADRATIC, quadratic, hidden / abs(quadratic.best)", "literature/test_postbuckling.py"),
-        "law-by-one-side-of-a-mixed-ordinate": (
-            "even, odd = parts(ordinates)", "even, odd = ordinates[0], ordinates[0]", MIXED),
-        "quadratic-term-that-hides-no-linear-one": (
-            "hidden = (abs(linear.best) + linear.missed) / amplitudes[0]", "hidden = 0.0", MIXED),
-        "a-linear-term-below-round-off-leads": (
-            "and not (turns and linear.best**2 <= SEEN * left * abs(quadratic.best))", "and True", MIXED),
     },
     "rodfem/continuation/singular.py": {
         "eigenvalues-have-the-units-of-loads": (
@@ -251,9 +177,6 @@ TABLE = {
     "rodfem/continuation/switching.py": {
         "what-is-free-on-the-trunk-stays-free": (
             "return None if still else neighbouring_index(", "return neighbouring_index(", CHAIN),
-        "stability-is-not-exchanged": (
-            "return low if there == high else low + 1", "return low",
-            "continuation/test_index_chain.py diagram/test_golden.py"),
         "branches-that-attract-alone": (
             "        if max(abs(values[i : i + 2])) > felt\n", "        if False\n", "continuation/test_reduced.py"),
     },
@@ -261,17 +184,12 @@ TABLE = {
         "known-row": ("if a.load == load:", "if a.load == load and b is not a:", "diagram/test_load_at_an_end.py"),
         "known-singular": (
             "if a.load == load and id(a.x) in singular:", "if a.load == load and id(a) in singular:", AT_SPECIAL),
-        "known-twice": (
-            "if known.distance(point.x) >= APART:", "if known.distance(point.x) >= 0:",
-            "diagram/test_load_at_an_end.py"),
         "deflated-steps-in-newtons": (
             "relative_size(system, x, step)", "step.norm() / (1.0 + x.norm())", "deflation/test_deflation.py"),
     },
     "rodfem/deflation/symmetries.py": {
         "mirrors-asked-of-a-molecule-in-metres": (
             "f.wave(seed) * f.sizes", "f.wave(seed)", "deflation/test_deflation.py"),
-        "quaternions-of-one-sign": (
-            "for each in (y, *_same_rotations(self.system, y)):", "for each in (y,):", "deflation/test_deflation.py"),
     },
     "rodfem/diagram/collisions.py": {
         "divergence-by-vectors-of-rigid-motions": ("if not self.zeros:", "if True:", "literature/test_free_rods.py"),
@@ -292,13 +210,11 @@ TABLE = {
         "a-pole-next-to-another-eigenvalue-is-a-divergence": (
             "min(abs(mu(low)), abs(mu(high))) / 2,", "min(abs(mu(low)), abs(mu(high))),",
             "diagram/test_light_and_slow_rods.py"),
-        "a-pole-is-a-divergence": ("        if pole:", "        if False:", "diagram/test_light_and_slow_rods.py"),
     },
     "rodfem/diagram/diagram.py": {
         "special-at": (
             "return self.solver(point).assess(self._special_at(point) or point, method, number)",
             "return self.solver(point).assess(point, method, number)", AT_SPECIAL),
-        "special-left": ("return self[leaves].special[number]", "return None", AT_SPECIAL),
     },
     "rodfem/diagram/doubts.py": {
         "damped-beside-a-fold": (
@@ -315,10 +231,6 @@ TABLE = {
     "rodfem/diagram/equivalence.py": {
         "zeros-of-a-mesh-make-two-branches-of-an-oval": (
             "alike = (noise > 0) & (first * second > 0)", "alike = (noise > 0) & False", "hard/test_fuzz.py"),
-        "sides-on-both-sides-of-a-load-are-images": (
-            "LOCATED * special.located_to", "1e9 * special.located_to", "hard/test_fuzz.py"),
-        "a-small-imperfection-is-a-symmetry": (
-            "found = mirrors(shape, first.x, found)  #", "#", "hard/test_fuzz.py"),
     },
     "rodfem/diagram/events.py": {
         "asked-row": ("        yield arc.b\n", "        yield replace(arc.b)\n", "diagram/test_load_at_an_end.py"),
@@ -353,8 +265,6 @@ TABLE = {
     "rodfem/diagram/special_search.py": {
         "folds-have-no-other-side": (
             "self._missed(piece, at, fold=found)", "pass", "continuation/test_unfolding.py"),
-        "what-turns-back-near-zero-is-passed": (
-            "            self._missed(piece, of_miss(piece, p))", "            pass", "continuation/test_unfolding.py"),
         "steps-are-short-from-where-a-branch-goes-back-to": (
             "max(largest, since - s)", "largest", "diagram/test_branches.py"),
     },
@@ -391,13 +301,6 @@ TABLE = {
     "rodfem/fem/checks.py": {
         "straight-rods-have-no-stiffness": (
             "np.array([first, moved - first])", "np.array([first, first])", "fem/test_quadrature_check.py"),
-        "quadrature-of-halves-alone": (
-            "np.maximum(second, third) / allowed", "second / allowed", "fem/test_quadrature_check.py"),
-        "masses-are-integrated": ("if equations.even:", "if True:", "fem/test_quadrature_check.py"),
-        "rules-as-good-as-they-are": (
-            "np.maximum(0.5**self._pieces.points * ", "np.maximum(1.0 * ", "fem/test_quadrature_check.py"),
-        "composite-rules-of-few-points": (
-            "POINTS, LEAST = 4096, 4", "POINTS, LEAST = 256, 4", "fem/test_quadrature_check.py"),
         "kinks-to-one-side-are-none": (
             "(bent | (larger < 2 * change)).any()", "(larger < 2 * change).any()", "diagram/test_kinks.py"),
         "convexity-of-the-undeformed-state-alone": (
@@ -406,8 +309,6 @@ TABLE = {
     "rodfem/fem/equations.py": {
         "constants-of-the-first-scene-stay": (
             "if line is self.register.line:", "if self.register.line is not None:", OTHER_CONSTANTS),
-        "forms-of-other-functions-serve": (
-            "== (discretization, comm) and f.scene.alike(scene)", "== (discretization, comm)", OTHER_CONSTANTS),
         "potential-of-constraints-at-nodes": (
             '{"potential": potential}', '{"potential": L}',
             "continuation/test_work.py"),
@@ -423,7 +324,6 @@ TABLE = {
     "rodfem/fem/fingerprint.py": {
         "rods-of-another-inertia-are-one": (
             "(mass * change).dot(change).real / (2", "0.0 / (2", "diagram/test_another_rod.py"),
-        "rods-that-differ-inside-the-range-are-one": (", *inside(own)] + (", "] + (", "diagram/test_another_rod.py"),
     },
     "rodfem/fem/form_compiler.py": {
         "constants-of-what-is-not-derived": (
@@ -432,9 +332,6 @@ TABLE = {
     "rodfem/fem/invariance.py": {
         "what-closes-a-ring-has-no-part": ("    table -= across @ (across.T @ table)\n", "", HARD),
         "stiff-strains-hide-bending": ("INVARIANT = 1e-12", "INVARIANT = 1e-9", "fem/test_symmetries.py"),
-        "a-stiff-twist-hides-a-load": ("zero = 1e-10", "zero = 1e-4", "fem/test_symmetries.py"),
-        "weak-springs-are-round-off": (
-            "    if not found or equations.loads is None:", "    if True:", "fem/test_symmetries.py"),
     },
     "rodfem/fem/known.py": {
         "rows-of-a-table-in-an-element-do-not-count": (
@@ -449,7 +346,7 @@ TABLE = {
     },
     "rodfem/fem/newton.py": {
         "ways-down-that-go-uphill": (
-            "if isfinite(longest) and quadratic_form(system, x, step) < 0:", "if False:", "hard/test_fuzz.py"),
+            "if isfinite(longest) and quadratic_form(system, x, step) < 0:", "if False:", "fem/test_way_down.py"),
         "rows-are-no-equilibria": (
             "if worst <= VIOLATED or", "if worst <= 1e9 * VIOLATED or", "continuation/test_row_checks.py"),
         "corrections-that-grow-are-round-off": (" and self.hold()", "", "literature/test_walls.py"),
@@ -460,17 +357,12 @@ TABLE = {
             "_of_strains(list(fields.scene.free_strains))", "[]", "fem/test_symmetries.py"),
         "free-rod-drifts-without-a-moment": (
             "uniform(-0.3, 0.3, (len", "uniform(-0.0, 0.0, (len", "literature/test_free_rods.py"),
-        "a-ring-nearly-breaks-its-motion-along-itself": (
-            "_jumps(state), 1e-5", "_jumps(state), 1e-3", "fem/test_symmetries.py"),
-        "a-bent-rod-breaks-a-symmetry": (
-            "SYMMETRIC_STATE = 1e-4", "SYMMETRIC_STATE = 1e-6", "fem/test_symmetries.py"),
     },
     "rodfem/linalg/chain.c": {
         "scales-start-from-one": (
             "memcpy(s, c->natural, c->n * sizeof(double));", "for (int i = 0; i < c->n; i++) s[i] = 1.0;",
             "problem/test_units.py"),
         "pivots-of-two-rows": ("det < 0 ? 1 : 2 * (e < 0)", "det < 0 ? 1 : 0", "linalg/test_chain.py"),
-        "pivots-of-one-row": ("c->negative += pivot < 0;", "c->negative += pivot < 1e-3;", "linalg/test_chain.py"),
     },
     "rodfem/linalg/chain.py": {
         "mumps-in-any-units": ("Mumps(kind, sizes)", "Mumps(kind)", "problem/test_units.py"),
@@ -484,18 +376,11 @@ TABLE = {
             "diagram/test_kinks.py"),
         "double-eigenvalue-of-flutter-twice": (
             "for i in _upper(values) if i not in left_out]", "for i in _upper(values)]", RECORDED),
-        "recorded-modes-without-those-of-special-points": (
-            "    for special in branch.special:\n", "    for special in ():\n", RECORDED),
-        "modes-that-meet-without-round-off": (
-            "np.maximum(noise, FLOOR", "np.maximum(0.0 * noise, FLOOR", "modes/test_modes.py"),
     },
     "rodfem/output/files.py": {
         "moments-without-a-natural-size": (
             '"length", "force", "moment", "energy")', '"length", "force", "energy")',
             "output/test_files.py output/test_formats.py"),
-        "another-row-is-restored": (
-            "_trimmed(value[row])", "_trimmed(value[row - 1])",
-            "output/test_files.py output/test_formats.py diagram/test_diagram.py"),
     },
     "rodfem/output/pieces.py": {
         "segments-beside-undecided-rows": (
@@ -526,7 +411,6 @@ TABLE = {
     "rodfem/output/words.py": {
         "reasons-of-kinks-are-lost": ('if row.get("kink"):', "if False:", "diagram/test_kinks.py"),
         "bars-are-rounded": ("ceil(error / 10.0**power * (1 - NEGLIGIBLE))", "round(error / 10.0**power)", ERRORS),
-        "bar-without-digits-left-out": ("error + abs(value - float(text))", "error", ERRORS),
     },
     "rodfem/problem/arguments.py": {
         "threads-work-at-once": ("with ONE_THREAD:", "with RLock():", "app/test_threads.py"),
@@ -538,13 +422,6 @@ TABLE = {
     "rodfem/problem/trials.py": {
         "constants-are-compared": (
             "abs(symbolic - number) <= least:", "abs(symbolic - number) <= 1e9:", "problem/test_mistakes.py"),
-        "energies-prefer-a-side": (
-            "abs(one - other) > NEGLIGIBLE * ", "abs(one - other) > 1e12 * ", "problem/test_mistakes.py"),
-        "energies-are-tried-at-one-load": (
-            "*map(scene.constants, scene.loads()), ", "*(), ", "problem/test_mistakes.py"),
-        "planes-are-tried-at-the-ends": (
-            "for load in scene.loads() if scene.load in asked", "for load in scene.span if scene.load in asked",
-            "problem/test_mistakes.py"),
     },
     "rodfem/problem/units.py": {
     },
@@ -564,11 +441,6 @@ TABLE = {
     "rodfem/stability/cluster.py": {
         "a-cluster-is-sought-from-one-shift": ("FARTHER = 3.0", "FARTHER = 1.0", "codim2/test_places.py"),
         "eigensolvers-leave-nothing-open": ("DRAWN = 3.0", "DRAWN = 0.0", "stability/test_cluster_noise.py"),
-        "clusters-are-not-closed": (
-            "for pairs in range(min(len(above), size // 2) + 1):", "for pairs in range(1):",
-            "stability/test_cluster_noise.py"),
-        "flutter-without-the-matrix-s-round-off": (
-            "of(2 * W @ B.T), *left", "0.0, *left", "stability/test_cluster_noise.py"),
     },
     "rodfem/stability/dependence.py": {
         "units-make-constraints-depend": (
@@ -576,12 +448,6 @@ TABLE = {
         "dependent-only-where-sigma-is-zero": (
             "_distance(blocks, x, pencil, w) > STALLED", "_distance(blocks, x, pencil, w) > 1e-12",
             "stability/test_dependence.py"),
-        "distances-of-the-mesh": (
-            "steepness = float(np.linalg.norm(slope) * np.sqrt(len(change)))",
-            "steepness = float(np.sqrt(len(change)))", "stability/test_dependence.py"),
-        "taut-rods-are-begun-with": (
-            "return bool(shape.system.scene.constraints) or taut(shape, x)",
-            "return bool(shape.system.scene.constraints)", "stability/test_dependence.py"),
     },
     "rodfem/stability/in_space.py": {
         "index-in-space-of-the-plane": (
@@ -592,21 +458,7 @@ TABLE = {
     "rodfem/stability/inertia.py": {
         "matrix-of-another-state": (
             "held is state and phase is self.system.phase and", "held is not None and", INERTIA),
-        "matrix-with-its-shift": (" and changes == self.matrix.stateGet()", "", INERTIA),
         "eigenvalues-beside-the-edge-of-the-band": ("\nFAR = 0.1\n", "\nFAR = 1e9\n", "stability/test_round_off.py"),
-        "signs-by-the-edge-of-the-band": (
-            "if own.factored == self._filled and abs(own.shift) > FAR * own.scale:", "if False:",
-            "stability/test_round_off.py"),
-        "constraints-are-miscounted": (
-            "below = negative - self.constraints - drifts", "below = negative - self.constraints", INERTIA),
-        "symmetries-are-no-zeros": (
-            "zero = self.eigenvalue_count(own.tolerance) - negative + self.drifts",
-            "zero = self.eigenvalue_count(own.tolerance) - negative",
-            "stability/test_inertia.py stability/test_assessment.py literature/test_hemitropic_buckled.py"),
-        "band-is-wide": (
-            "ZERO_BAND = 1e-7", "ZERO_BAND = 1e-2",
-            "stability/test_inertia.py stability/test_assessment.py "
-            "literature/test_cord.py continuation/test_index_chain.py"),
     },
     "rodfem/stability/motion_names.py": {
         "round-off-is-a-rotation": ("LEAST = 1e-5", "LEAST = 0.0", "stability/test_frequencies.py"),
@@ -625,19 +477,12 @@ TABLE = {
             "not (self.solver.slow or several)", "not self.solver.slow", "diagram/test_light_and_slow_rods.py"),
         "modes-without-their-parts-along-free-motions": (
             "            force.array[drifts] = 0.0\n", "", "literature/test_free_rods.py"),
-        "left-vectors-have-free-motions": ("if free and not left:", "if free:", "literature/test_free_rods.py"),
-        "rigid-motions-take-all-digits": (
-            "found = self.nearest(number + BEYOND, SHIFT * self._one, left=left)",
-            "found = self.nearest(number + BEYOND, 0.0, left=left)", "literature/test_free_rods.py"),
     },
     "rodfem/stability/pencil.py": {
         "symmetric-pencils-without-natural-units": (
             "    if units.ordinary:\n        return matrix, mass\n", "    if True:\n        return matrix, mass\n",
             "stability/test_eigenvalues_in_si_units.py"),
         "masses-at-nine-loads": ("raise ConvergenceError(trouble)", "pass", "diagram/test_family_of_states.py"),
-        "a-hinge-without-mass-in-small-units": (
-            "        scaled.diagonalScale(system.sizes, system.sizes)", "        pass",
-            "stability/test_eigenvalues_in_si_units.py"),
         "a-one-of-other-units-beside-the-stiffness": (
             "return 1.0 if units.ordinary else units.energy / float(system.sizes.getValue(index).real) ** 2",
             "return 1.0", "problem/test_units.py"),
@@ -645,8 +490,6 @@ TABLE = {
     "rodfem/stability/reduced_stiffness.py": {
         "phase-conditions-do-not-move": (
             "                out += term + term.T", "                pass", "continuation/test_reduced_stiffness.py"),
-        "singular-states-are-solved-with": (
-            "        if near:\n", "        if False:\n", "continuation/test_reduced_stiffness.py"),
     },
     "rodfem/stability/soft_mode.py": {
         "kinks-are-stable": ("if doubt:", "if doubt and not negative:", "diagram/test_kinks.py"),
@@ -658,9 +501,6 @@ TABLE = {
         "round-off-of-two-that-meet-has-no-bound": (
             "np.minimum(rounded * np.linalg.norm(left, axis=1), np.sqrt(rounded * np.linalg.norm(matrix)))",
             "rounded * np.linalg.norm(left, axis=1)", "codim2/test_locus.py"),
-        "slepc-sorts-all-eigenvalues": (
-            "                if self.rank > ALL:", "                if True:", "diagram/test_all_frequencies.py"),
-        "mass-of-a-quaternions-own-length": ("RANK = 1e-13", "RANK = 1e-3", "diagram/test_all_frequencies.py"),
     },
     "rodfem/tolerances.py": {
         "close-special-points-are-on-one-locus": (
@@ -677,10 +517,6 @@ TABLE = {
         "drafts-go-through-links": (
             "draft.unlink(missing_ok=True)  # it may be a link to another file", "pass",
             "output/test_foreign_files.py"),
-        "folder-without-a-lock": (
-            "if comm.bcast(place in FOLDERS):", "if comm.bcast(True):",
-            "hard/test_files_after_a_kill.py output/test_files.py "
-            "output/test_formats.py hard/test_numerical_faults.py"),
     },
     "rodfem/writhe.py": {
         "writhe-of-one-polygon": ("(4 * fine - coarse) / 3", "fine", "report/test_contents.py"),

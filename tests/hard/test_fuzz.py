@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from hard.fuzz import comparison, wider
+from hard.fuzz import comparison
 from hard.fuzz.comparison import compared
 from hard.fuzz.oracle import Oracle
 from hard.fuzz.scenes import scene
@@ -55,19 +55,6 @@ def test_a_random_scene(seed: int, number: int) -> None:
     assert not any("symmetry" in sentence for sentence in found.said)
 
 
-WIDE = [(1, 31), pytest.param(1, 8, marks=pytest.mark.long)]
-"""Seed and number."""
-
-
-@pytest.mark.parametrize(("seed", "number"), WIDE)
-@pytest.mark.usefixtures("few_rows")
-def test_a_scene_of_the_wider_family(seed: int, number: int) -> None:
-    rod, facts = wider.scene(seed, number)
-    found = compared(rod, number, 0, facts)
-    assert found.rows > found.unclear
-    assert (found.wrong, found.differs, found.refused) == ([], [], [])
-
-
 @pytest.mark.long
 def test_an_oval_that_lies_otherwise_to_the_elements_is_no_other_branch() -> None:
     """The index in space has a zero that the mesh makes 1.58e-9 of one oval, and 1.56e-9 of one that is turned."""
@@ -107,22 +94,6 @@ def test_the_way_down_leaves_a_saddle() -> None:
         assert Oracle(solver.equilibria.system).eigenvalues(found[-1].x).min() > -1e-9
     assert found[0].energy == pytest.approx(found[1].energy, abs=1e-10)
     assert [point.negative for point in found] == [0, 0]
-
-
-@pytest.mark.long
-def test_the_way_down_from_a_saddle_does_not_turn_back() -> None:
-    """Its unstable eigenvalue grows on the way: steps that were uphill led back, round and round on some meshes.
-
-    The first state was the saddle on three of these meshes, and the equilibrium below it on the other.
-    """
-    energies = []
-    for mesh in ((5, 6), (7, 5), (8, 6), (20, 3)):
-        solver = Solver(wider.scene(3, 144)[0], Discretization("pointwise", *mesh))
-        point = solver.equilibrium(solver.scene.span[0])
-        assert point.negative == 0
-        assert Oracle(solver.equilibria.system).eigenvalues(point.x).min() > 0
-        energies.append(point.potential)
-    assert energies == pytest.approx([energies[-1]] * len(energies), abs=1e-7)
 
 
 @pytest.mark.long

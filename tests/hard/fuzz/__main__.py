@@ -2,8 +2,7 @@
 
 Each scene is worked on in a child process, which is replaced where it takes too long or dies.  A line of JSON a scene
 is added to ``results/fuzz-SEED.jsonl`` (or ``--output FILE``); scenes that have one are not repeated.  ``--only N``
-works on one scene and prints what it shows, ``--summary FILE...`` says what files contain.  ``--wide`` takes the scenes
-of the wider family (:mod:`.wider`), whose files are ``results/fuzz-wide-SEED.jsonl``.
+works on one scene and prints what it shows, ``--summary FILE...`` says what files contain.
 """
 
 import argparse
@@ -25,7 +24,6 @@ def main() -> None:
     )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", type=int, default=100, help="scenes 0 to this of the seed")
-    parser.add_argument("--wide", action="store_true", help="scenes of the wider family")
     parser.add_argument("--depth", type=int, default=1)
     parser.add_argument("--limit", type=float, default=LIMIT, help="seconds of a scene")
     parser.add_argument("--output", type=Path)
@@ -34,15 +32,15 @@ def main() -> None:
     parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)  # what the children are given
     given = parser.parse_args()
     if given.work:
-        worker.work(given.seed, given.depth, given.wide)
+        worker.work(given.seed, given.depth)
     elif given.summary:
         print(in_words([json.loads(line) for file in given.summary for line in file.read_text().splitlines()]))
     elif given.only is not None:
-        print(json.dumps(worker.examine(given.seed, given.only, given.depth, given.wide), indent=1))
+        print(json.dumps(worker.examine(given.seed, given.only, given.depth), indent=1))
     else:
-        file = given.output or Path("results") / f"fuzz-{'wide-' * given.wide}{given.seed}.jsonl"
+        file = given.output or Path("results") / f"fuzz-{given.seed}.jsonl"
         file.parent.mkdir(parents=True, exist_ok=True)
-        entries = worker.run(file, given.seed, given.scenes, given.depth, given.limit, given.wide)
+        entries = worker.run(file, given.seed, given.scenes, given.depth, given.limit)
         print(in_words(entries))
         sys.exit(any(worker.is_fault(entry) for entry in entries))
 

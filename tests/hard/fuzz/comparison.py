@@ -20,7 +20,6 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
 from rodfem.tolerances import round_off
 
-from .known import Known
 from .oracle import Oracle
 
 ZERO, NEAR = 1e-7, 1e-4
@@ -58,8 +57,6 @@ APART = 0.05
 """Part of the range beyond which two special points outside each other's bars are two: each lacks a partner."""
 AT = (0.37, 0.81)
 """Loads to stop at, as parts of the range."""
-NOTHING = Known()
-"""What is known of most scenes."""
 
 
 @dataclass
@@ -106,16 +103,15 @@ def plans(scene: Scene, depth: int) -> tuple[Plan, Plan]:
     return tuple(Plan(at=at, depth=depth, steps=s, most_branches=MOST_BRANCHES) for s in steps)  # type: ignore[return-value]
 
 
-def compared(scene: Scene, number: int = 0, depth: int = 1, known: Known = NOTHING) -> Compared:
-    """Trace a scene twice and compare, also with what is ``known`` of it."""
+def compared(scene: Scene, number: int = 0, depth: int = 1) -> Compared:
+    """Trace a scene twice and compare."""
     out, diagrams = Compared(scene.name), []
     for mesh, plan, most in zip(meshes(scene, number), plans(scene, depth), ROWS, strict=True):
-        diagram = traced(scene, mesh, replace(plan, events=known.events if scene.conservative else ()), out)
+        diagram = traced(scene, mesh, plan, out)
         if diagram is None:
             continue
         diagrams.append(diagram)
         out.said += open_questions(diagram)
-        out.wrong += known.faults(diagram)
         check_rows(diagram, out, most)
         if scene.conservative:
             for branch in diagram:

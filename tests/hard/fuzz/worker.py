@@ -10,11 +10,9 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from rodfem import InputError, Scene
+from rodfem import InputError
 
-from . import wider
-from .comparison import NOTHING, compared, of_a_sentence
-from .known import Known
+from .comparison import compared, of_a_sentence
 from .scenes import scene
 
 Entry = dict[str, Any]
@@ -23,42 +21,36 @@ RENEWED = 12
 """Scenes of one child: compiled forms stay in its memory."""
 
 
-def made_by(seed: int, number: int, wide: bool) -> tuple[Scene, Known]:
-    """Scene of one of the two families, and what is known of it."""
-    return wider.scene(seed, number) if wide else (scene(seed, number), NOTHING)
-
-
-def examine(seed: int, number: int, depth: int = 1, wide: bool = False) -> Entry:
+def examine(seed: int, number: int, depth: int = 1) -> Entry:
     """Entry of a scene; an exception that is no error of rodfem's own is a crash."""
     entry: Entry = {"seed": seed, "number": number, "outcome": COMPARED}
     try:
-        made, known = made_by(seed, number, wide)
+        made = scene(seed, number)
     except InputError as trouble:
         fault = of_a_sentence(str(trouble))
         return entry | {"outcome": REFUSED, "refused": [str(trouble)], "wrong": [fault] if fault else []}
     try:
-        found = compared(made, number, depth, known)
+        found = compared(made, number, depth)
     except Exception:  # whatever it is, it is what the fuzzer is for
         return entry | {"outcome": CRASHED, "scene": made.name, "trace": traceback.format_exc().splitlines()}
     outcome = REFUSED if len(found.refused) == 2 and not found.rows else COMPARED
     return entry | found.entry() | {"outcome": outcome}
 
 
-def work(seed: int, depth: int, wide: bool) -> None:
+def work(seed: int, depth: int) -> None:
     """Child process: a number a line comes in, an entry a line goes out."""
     out = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # whatever prints besides must not be taken for an entry
     for line in sys.stdin:
-        out.write(json.dumps(examine(seed, int(line), depth, wide)) + "\n")
+        out.write(json.dumps(examine(seed, int(line), depth)) + "\n")
         out.flush()
 
 
 class Child:
     """A child process that examines scenes of a seed."""
 
-    def __init__(self, seed: int, depth: int, wide: bool, errors: Path) -> None:
+    def __init__(self, seed: int, depth: int, errors: Path) -> None:
         command = [sys.executable, "-m", "tests.hard.fuzz", "--work", "--seed", str(seed), "--depth", str(depth)]
-        command += ["--wide"] if wide else []
         with errors.open("a") as file:
             self.process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=file, text=True, start_new_session=True
@@ -87,14 +79,14 @@ class Child:
         self.process.wait()
 
 
-def run(file: Path, seed: int, scenes: int, depth: int, limit: float, wide: bool = False) -> list[Entry]:
+def run(file: Path, seed: int, scenes: int, depth: int, limit: float) -> list[Entry]:
     """Entries of scenes 0 to ``scenes``: those of the file, and the others, which are added to it."""
     known = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     entries = {entry["number"]: entry for entry in known if entry["seed"] == seed}
     child = None
     try:
         for number in (n for n in range(scenes) if n not in entries):
-            began, child = time.time(), child or Child(seed, depth, wide, file.with_suffix(".err"))
+            began, child = time.time(), child or Child(seed, depth, file.with_suffix(".err"))
             entry = child.ask(seed, number, limit) | {"seconds": round(time.time() - began, 1)}
             entries[number] = entry
             with file.open("a") as results:
