@@ -85,7 +85,7 @@ def tendons(names: dict[str, Any]) -> Figure:
     """The robot at growing tensions, with its tendons at the last one."""
     figure = Figure(figsize=(6.0, 4.2), layout="constrained")
     axes = in_space(figure, 18.0, -40.0)
-    points = names["diagram"][0].points
+    points = rodfem.trace(names["robot"]("part", 1.0, names["pulled"]), plan=Plan(depth=0, error_bars=False))[0].points
     for share in (0.0, 0.25, 0.5, 1.0):
         point = at(points, share)
         colour = "#1f77b4" if share == 1.0 else GREY

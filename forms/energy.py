@@ -56,13 +56,13 @@ def logarithmic_stretch(v: Expr, stiffness: Expr) -> Expr:
     return stiffness * (v[2] * ufl.ln(v[2]) - v[2] + 1)
 
 
-def tendon(v: Expr, k: Expr, tension: Expr, at: tuple[Expr, Expr]) -> Expr:
-    """Potential ``T |v + k x d|`` per unit length of a tendon that slides through the rod at ``d = (at[0], at[1], 0)``.
+def tendon(v: Expr, k: Expr, tension: Expr, at: tuple[Expr, Expr], slope: tuple[Expr, Expr] = (0.0, 0.0)) -> Expr:
+    """Potential ``T |v + k x d + d'|`` per unit length of a tendon that slides through the rod at ``d = (*at, 0)``.
 
-    ``T`` is its ``tension``, and ``|v + k x d|`` its length per length of the rod: what a tendon pulled with a given
-    force shortens by is the work of that force (Rucker & Webster, IEEE Trans. Robot. 27 (2011) 1033-1044).  ``v`` (3,)
-    and ``k`` (3,) are the strains, ``at`` components along ``d1`` and ``d2``, functions of the arclength if wanted.
+    ``T`` is its ``tension``, and ``|v + k x d + d'|`` its length per length of the rod: what a tendon pulled with a
+    given force shortens by is the work of that force (Rucker & Webster, IEEE Trans. Robot. 27 (2011) 1033-1044).  ``v``
+    (3,) and ``k`` (3,) are the strains, ``at`` components along ``d1`` and ``d2``, ``slope`` their derivatives.
     """
     x, y = at
-    slope = (v[0] - k[2] * y, v[1] + k[2] * x, v[2] + k[0] * y - k[1] * x)
-    return tension * ufl.sqrt(sum(component**2 for component in slope))
+    along = (v[0] - k[2] * y + slope[0], v[1] + k[2] * x + slope[1], v[2] + k[0] * y - k[1] * x)
+    return tension * ufl.sqrt(sum(component**2 for component in along))

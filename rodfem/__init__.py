@@ -47,7 +47,7 @@ _HOMES = {
     for home, names in {
         "codim2.locus": "Locus",
         "problem.ends": "End clamped pinned sliding hinged sliding_hinge circular_guide free elastic Ring",
-        "problem.contribution": "Attachment Constraint integral at everywhere",
+        "problem.contribution": "Attachment Constraint integral at everywhere tendon",
         "problem.scene": "Scene Parameter Ordinate Inertia Drag",
         "problem": "section",
         "problem.table": "tabulated path",

@@ -35,6 +35,7 @@ from rodfem.problem.contribution import Constraint as Constraint
 from rodfem.problem.contribution import at as at
 from rodfem.problem.contribution import everywhere as everywhere
 from rodfem.problem.contribution import integral as integral
+from rodfem.problem.contribution import tendon as tendon
 from rodfem.problem.ends import End as End
 from rodfem.problem.ends import Ring as Ring
 from rodfem.problem.ends import circular_guide as circular_guide

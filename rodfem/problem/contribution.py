@@ -7,6 +7,7 @@ An end, an attachment, a constraint, and the scene itself with what acts along t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -16,10 +17,10 @@ import ufl
 
 from rodfem.errors import InputError
 from rodfem.expressions import differentiated, evaluated
-from rodfem.forms import inertia, loads
+from rodfem.forms import energy, inertia, loads
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY
-from rodfem.problem.arguments import convert, finite, number_of, optional, yes_or_no
+from rodfem.problem.arguments import convert, finite, number_of, optional, reals, yes_or_no
 from rodfem.problem.functions import (
     STATES,
     Constants,
@@ -254,6 +255,11 @@ class Constraint(Contribution):
         """What it is, for pictures, in which it has no place."""
         return f"constraint at s = {self.s:g}"
 
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Arclengths at which elements meet for it."""
+        return () if self.s is None else (self.s,)
+
     def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
         """One scalar multiplier."""
         return [Unknown(MULTIPLIERS, number)]
@@ -277,6 +283,32 @@ class Integral(Constraint):
     def value(self, x: Place, c: Constants) -> Any:
         """Integrand of the integral that is zero."""
         return self.of(x, c) - self.equals(c) / x.length
+
+
+@dataclass(frozen=True)
+class Tendon(Integral):
+    """A tendon, a constraint on its length: the multiplier is the tension, which is given, or else an unknown.
+
+    Made by :func:`tendon`.
+    """
+
+    equals: Given = role_field(Role("length of a tendon", "f(c)", 0, placed=False))
+    tension: Given = role_field(Role("tension of a tendon", "f(c)", 0, placed=False))
+    interval: tuple[float, ...] = ()
+    words = "tendon"
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Arclengths of its ends, unless it is as long as the rod."""
+        return self.interval
+
+    def unknowns(self, number: int, normal: int | None, centreline: bool) -> list[Unknown]:
+        """Tension, unless it is given."""
+        return [] if self.tension is not None else super().unknowns(number, normal, centreline)
+
+    def lagrangian(self, at: Site) -> Iterator[Any]:
+        """Tension times length."""
+        yield at.y[0] * self.value(at.x, at.c) if self.tension is None else self.tension(at.c) * self.of(at.x, at.c)
 
 
 @dataclass(frozen=True)
@@ -380,6 +412,34 @@ def integral(of: OfPlace, equals: Given = 0.0) -> Constraint:
 def at(s: float, of: OfPlace) -> Constraint:
     """Constrain ``of(x, c) = 0`` at arclength ``s``: a point kept on a plane, say.  The multiplier is one scalar."""
     return Constraint(of, s)
+
+
+def tendon(
+    tension: Given = None, *, at: Any, length: Given = None, interval: tuple[float, float] | None = None
+) -> Constraint:
+    """Let a tendon slide through the rod at ``at``, one of the ``constraints`` of a scene.
+
+    It is pulled with a ``tension(c)``, or has the ``length(c)``, and a tension that is an unknown: ``g1``, if it is the
+    first of the constraints.  ``at`` are its coordinates along ``d1`` and ``d2``, two numbers or a function of ``c``
+    with ``c.s``, ``interval`` the arclengths between which it runs.  Contact force and moment are those of rod and
+    tendon together.  Raises :class:`InputError` unless it has a tension or a length.
+    """
+    if (tension is None) == (length is None):
+        raise InputError(f"A tendon has the tension {tension} and the length {length}: give one of the two.")
+    at = at if callable(at) else reals("at", at, (0.0, 0.01), 2, finite)
+    run = () if interval is None else reals("interval", interval, (0.0, 0.2), 2, finite)
+    if run and not run[0] < run[1]:
+        raise InputError(f"A tendon runs from s = {run[0]:g} to {run[1]:g}: give the lesser arclength first.")
+
+    def of(x: Place, c: Constants) -> Any:
+        varied, slope = copy(c), (0.0, 0.0)
+        if callable(at):
+            varied.s = ufl.variable(ufl.as_ufl(c.s))
+            slope = tuple(ufl.diff(ufl.as_ufl(y), varied.s) for y in at(varied))
+        taut = energy.tendon(x.v, x.k, 1.0, at(varied) if callable(at) else at, slope)
+        return ufl.conditional(ufl.And(ufl.ge(x.s, run[0]), ufl.le(x.s, run[1])), taut, 0.0 * taut) if run else taut
+
+    return Tendon(of, equals=length, tension=tension, interval=run)
 
 
 def everywhere(of: OfPlace, *, strain: bool) -> Constraint:

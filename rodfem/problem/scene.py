@@ -289,7 +289,7 @@ class Scene(Contribution, metaclass=Stated):
         ``potential(x, c)``, potential energy per unit length of what else acts along the rod: an elastic foundation, a
         pressure.
     attachments, constraints
-        What is attached along the rod, and equations that it must fulfil: see :mod:`rodfem.problem.ends`.
+        What is attached along the rod; tendons, and equations that it must fulfil: see :mod:`rodfem.problem.ends`.
     breaks
         Arclengths at which the material or the loads jump: element boundaries are put there.
     planar
@@ -448,7 +448,8 @@ class Scene(Contribution, metaclass=Stated):
     @property
     def joints(self) -> tuple[float, ...]:
         """Arclengths inside the rod that must be element boundaries, in ascending order; one for what is one place."""
-        return self._distinct({*self.breaks, *(part.s for part in self.parts if part.s is not None)})
+        tendons = (s for x in self.constraints for s in x.places)
+        return self._distinct({*self.breaks, *(part.s for part in self.parts if part.s is not None), *tendons})
 
     @property
     def stops(self) -> tuple[float, ...]:

@@ -71,7 +71,7 @@ def check_places(scene: Scene) -> None:
     """Raise :class:`SceneError` for a place that is not on the rod, or next to another one or an end, but not there."""
     a, b = scene.interval
     places = [("break", s) for s in scene.breaks] + [("attachment", x.s) for x in scene.attachments]
-    places += [("constraint", x.s) for x in scene.constraints if x.s is not None]
+    places += [("constraint" if x.s is not None else "end of a tendon", s) for x in scene.constraints for s in x.places]
     for what, s in [*places, *(("ordinate", s) for s in scene.ordinate.places)]:
         if not a <= s <= b:
             raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
