@@ -17,14 +17,9 @@ from functools import cache
 from pathlib import Path
 from typing import NoReturn
 
-HOMELESS = (
-    "This user has no home folder, in which compiled code would be kept: set XDG_CACHE_HOME to a folder that can be "
-    "written."
-)
-
 
 def folder() -> Path:
-    """Folder in which FFCx keeps its kernels; raises :class:`RuntimeError` where there is no home folder to have it."""
+    """Folder in which FFCx keeps its kernels."""
     given = os.environ.get("XDG_CACHE_HOME")
     return (Path(given) if given else Path.home() / ".cache") / "fenics"
 
@@ -45,14 +40,6 @@ def refused(error: OSError) -> str:
         f"The folder {folder()}, which keeps compiled code, cannot be written ({error.strerror or error}): set "
         "XDG_CACHE_HOME to a folder that can be written."
     )
-
-
-def have_home() -> None:
-    """Have a home folder, which dolfinx asks for in any case; raises :class:`RuntimeError` where there is none."""
-    try:
-        Path.home()
-    except RuntimeError:
-        os.environ["HOME"] = str(folder().parent)
 
 
 class Job:

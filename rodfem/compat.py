@@ -22,10 +22,6 @@ from rodfem.errors import SetupError
 from rodfem.forms.importing import without_pkg_resources
 
 try:
-    code_cache.have_home()
-except RuntimeError as homeless:
-    raise SetupError(code_cache.HOMELESS) from homeless
-try:
     with without_pkg_resources():
         import basix
         import dolfinx

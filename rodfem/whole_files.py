@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 DRAFTS = ".*.rodfem-part*"  # names of drafts: that of the file, whose suffix says what it is to those who write it
 LOCK = ".lock"  # file whose lock says that the folder is in use; it has the process and the host in words
-OF_A_RUN = ("modes.h5", "modes-*.png", "modes-*.gif", "locus-*.json", "locus.png", "diagram.png", "shape.png")
+OF_A_RUN = ("modes.h5", "locus-*.json", "locus.png", "diagram.png", "shape.png")
 """Names of the files that a run may write next to its diagram and states."""
 FOLDERS: set[Path] = set()  # folders whose lock this process has
 ANOTHER_FOLDER = "choose another one with run(output=...)"

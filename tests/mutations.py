@@ -274,8 +274,6 @@ TABLE = {
             "        of_ordinate = of_load = s.error_estimate = self",
             "diagram/test_sweep.py"),
         "steps-of-round-off-in-a-sweep": ("least = 1e-12", "least = 0.0", "diagram/test_flutter_at_a_row.py"),
-        "the-first-mesh-that-does-not-help-is-the-last": (
-            "(3 if least > 1e-6 else 1)", "1", "adaptivity/test_accuracy_control.py"),
         "a-family-of-states-is-not-said": (
             "        if self._zeros:", "        if False:", "diagram/test_family_of_states.py"),
         "ordinate-of-a-load-that-is-exact": (

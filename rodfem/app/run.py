@@ -6,7 +6,7 @@ import atexit
 import gc
 import os
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cache, partial
@@ -158,7 +158,7 @@ class Terminal(Report):
         named = shlex.quote(str(output))
         self.say(f"Results in {output}{os.sep}: diagram.json, states.h5 (rodfem view {named} shows them)")
         if plan.method or plan.modes:
-            self._assess(diagram, figures)
+            self._assess(diagram)
         if plan.locus is not None:
             self._follow(diagram, figures, plan.locus)
         if figures:
@@ -178,13 +178,13 @@ class Terminal(Report):
                     found = special.derivative(name)
                     special.derivatives[name] = found.value, found.error if bar else nan
 
-    def _assess(self, diagram: Diagram, figures: bool) -> None:
-        """Judge the states at the loads of the plan, each on its own mesh; save and draw their modes."""
+    def _assess(self, diagram: Diagram) -> None:
+        """Judge the states at the loads of the plan, each on its own mesh; save their modes."""
         scene, plan, file = diagram.scene, self.plan, self.output / "modes.h5"
         which = f"left-most {scene.inertia.words}" if scene.conservative else f"{scene.inertia.words} nearest zero"
         self.say(f"\nIs it stable? ({which})")
         finder_on = cache(lambda mesh: ModeFinder(diagram.solvers[mesh], plan.error_bars))
-        saved: list[tuple[str, int]] = []
+        saved = False
         for branch, special in ((b, s) for b in diagram for s in b.special if s.kind == USER):
             found: tuple[Verdict | None, Modes | None] = None, None
             with self._guard(diagram, branch, special):
@@ -196,20 +196,10 @@ class Terminal(Report):
             if modes is not None:
                 self._name("modes.h5")
                 keep = partial(save_modes, modes, file, branch.name, special.row, _header(diagram))
-                on_first(self.comm, partial(keep, first=not saved, scene=scene))
-                saved.append((branch.name, special.row))
+                on_first(self.comm, partial(keep, first=not saved))
+                saved = True
         if saved:
-            self._draw_modes(saved if figures else [])
-
-    def _draw_modes(self, saved: Sequence[tuple[str, int]]) -> None:
-        """Draw the modes that were ``saved`` of rows of branches, a picture of each row."""
-        from rodfem.output.plot_modes import draw_modes
-
-        output, pictures = self.output, [f"modes-{name.replace(' ', '-')}-{row}.png" for name, row in saved]
-        self._name(*pictures)
-        for place, picture in zip(saved, pictures, strict=True):
-            on_first(self.comm, partial(draw_modes, output / "modes.h5", *place, output / picture))
-        self.say(f"Modes in {output}{os.sep}: {', '.join(['modes.h5', *pictures])}")
+            self.say(f"Modes in {self.output}{os.sep}: modes.h5 (rodfem view moves them)")
 
     def _follow(self, diagram: Diagram, figures: bool, asked: tuple[str, float, float]) -> None:
         """Follow each special point that no locus passes in the plane of the load and the parameter asked for."""

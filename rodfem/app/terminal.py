@@ -20,7 +20,6 @@ from rodfem.continuation.branch import Branch, Point, SpecialPoint, not_followed
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer
 from rodfem.errors import many
-from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import RODS
 from rodfem.modes.modes import Modes
@@ -122,7 +121,7 @@ class Report(Observer):
         """Say what is solved, with how many unknowns, what was left out, and the accuracy asked for."""
         scene, f = system.scene, system.fields
         self.say(f"{scene.title or scene.name}: {scene.rod} rod, {mesh_in_words(mesh_of(system))}")
-        if accuracy is not None and scene.conservative:
+        if accuracy is not None:
             self.detail(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
         self.detail(f"  unknowns: {f.describe()}, load {scene.load}")
         self.units, self.load = scene.units, scene.load
@@ -146,14 +145,6 @@ class Report(Observer):
         self.warn(
             f"The stored energy depends on {', '.join(STRAINS[i] for i in ignored)}, but a rod that is {scene.rod} "
             f"keeps that undeformed, so that it counts for nothing: leave it out, or choose rod={kind!r}."
-        )
-
-    def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
-        """Say which mesh was chosen, and by how much ``number`` frequencies change on the next one, relative."""
-        word = "" if change <= asked else f", above the {asked:g} asked for: round-off"
-        self.say(
-            f"{mesh.elements} elements of degree {mesh.degree} for an accuracy of {asked:g}: with half as many more "
-            f"the {number} frequencies change by {rounded_up(change):.0e}{word}"
         )
 
     def mesh(self, system: System, load: float, why: str) -> None:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 
 if TYPE_CHECKING:
-    from rodfem.fem.fields import Discretization
     from rodfem.fem.system import System
 
 
@@ -26,9 +25,6 @@ class Observer:
 
     def system(self, system: System, accuracy: float | None = None) -> None:
         """A scene has been discretised; an ``accuracy`` may be asked for."""
-
-    def frequency_mesh(self, mesh: Discretization, number: int, change: float, asked: float) -> None:
-        """On the chosen ``mesh`` ``number`` frequencies still ``change``, relative; an error was ``asked`` for."""
 
     def branch(self, branch: Branch) -> None:
         """A branch begins."""

@@ -28,7 +28,7 @@ from rodfem.diagram.equilibria import check_start
 from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import EQUATIONS, Plan, entries, plan_of
 from rodfem.diagram.solver import MESH, METHOD, POINT, RANKS, SCENE, Solver, state_of
-from rodfem.diagram.sweep import Sweep, mesh_of_frequencies
+from rodfem.diagram.sweep import Sweep
 from rodfem.errors import InputError
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
@@ -45,7 +45,6 @@ from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, round_off_of_strains, statement
 from rodfem.ranks import agree, end_together, on_first
 from rodfem.stability.assessment import Verdict
-from rodfem.stability.nonsymmetric import FREQUENCIES
 from rodfem.timing import Clock
 from rodfem.whole_files import locked
 
@@ -410,7 +409,7 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
     recorder, clock = Recorder(observer), Clock()
     with form_compiler.announce_compilation(recorder.compiling) as compiled:
         with clock("setup"):
-            mesh = _mesh(scene, discretization, plan, recorder, comm)
+            mesh = _mesh(scene, discretization, plan, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
             if plan.accuracy is None and (doubt := check_start(found, plan.load_range(scene))):
                 recorder.warn(doubt)
@@ -459,15 +458,9 @@ def _with_bars(plan: Plan, solver: BranchSolver, observer: Observer) -> Plan:
     return plan
 
 
-def _mesh(
-    scene: Scene, discretization: Discretization, plan: Plan, observer: Observer, comm: MPI.Comm
-) -> Discretization:
-    """Discretisation as given, or for the accuracy of the plan: to start with, or of a whole sweep."""
+def _mesh(scene: Scene, discretization: Discretization, plan: Plan, comm: MPI.Comm) -> Discretization:
+    """Discretisation as given, or to start with for the accuracy of the plan."""
     if plan.accuracy is None or discretization.vertices is not None:
         return discretization
-    if scene.conservative:
-        mesh = start_mesh(scene, discretization.formulation, plan.accuracy, comm)
-    else:
-        mesh, change = mesh_of_frequencies(scene, discretization.formulation, plan, plan.accuracy, comm)
-        observer.frequency_mesh(mesh, plan.spectrum or FREQUENCIES, change, plan.accuracy)
+    mesh = start_mesh(scene, discretization.formulation, plan.accuracy, comm)
     return replace(mesh, factors=discretization.factors)

@@ -173,6 +173,11 @@ class Plan:
                 f"An accuracy of {accuracy:g} is not attainable: ask for one between {FINEST:g} (round-off) and "
                 f"{COARSEST:g}."
             )
+        if not scene.conservative:
+            raise InputError(
+                f"The accuracy {accuracy:g} is one of branches, and a load without a potential is swept on one mesh: "
+                "leave it out, and give more elements (Discretization(elements=...)) where an error bar is too wide."
+            )
         if doubt := round_off_of_strains(scene):
             raise InputError(f"{doubt}: no accuracy can be promised; {FLEXIBLE}, or give a mesh.")
 

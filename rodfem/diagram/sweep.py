@@ -8,17 +8,13 @@ At each load the equilibrium is solved for, and all eigenvalues ``mu = omega^2``
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cache, partial
-from math import ceil
 from typing import NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound, derived
-from rodfem.adaptivity.mesh_sequence import start_mesh
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.branch_solver import BranchSolver
@@ -32,17 +28,13 @@ from rodfem.diagram.doubts import Quadrature
 from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_first
 from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError, many
-from rodfem.fem.fields import Discretization
 from rodfem.fem.shape import halved
-from rodfem.fem.system import System
-from rodfem.problem.scene import Scene
 from rodfem.ranks import as_failure, guard
 from rodfem.stability.cluster import Cluster, as_vectors
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.inertia import Index
 from rodfem.stability.nonsymmetric import FREQUENCIES, REAL, Frequencies, NonsymmetricSolver, begins_slowly, label
-from rodfem.stability.spectrum import SHIFT
-from rodfem.tolerances import DRIFT, ROUND_OFF, round_off, unit
+from rodfem.tolerances import DRIFT, ROUND_OFF, round_off
 
 LOADS = 101  # number of loads at which a range is sampled
 
@@ -313,15 +305,12 @@ class Sweep:
         self.observer.special(branch, special)
 
     def _error_bars(self, branch: Branch) -> None:
-        """Estimate the errors of all special points, and say where an accuracy that was asked for is not reached."""
-        asked = self.plan.accuracy
+        """Estimate the errors of all special points."""
         with self.solver.system.clock.scope("error bars"):
             comm, warn, errors = self.solver.system.comm, self.observer.warn, SweepErrors(self.solver, self.span)
             for s in branch.special:
                 with guard(f"No error of the {s.kind.words} at {s.point.load:.6g} was estimated", comm, warn):
                     errors.estimate(s)
-                if asked is not None and s.error_estimate > asked * unit(s.point.load, one=self.units.load):
-                    s.note = s.note or f"accuracy {asked:g} not reached"
 
 
 class SweepErrors(Enriched):
@@ -371,45 +360,3 @@ class SweepErrors(Enriched):
             mu, doubt = located.cluster.mean, located.mean_uncertainty
         s.omega2_error = bound(s.omega2, mu, max(doubt, 10.0 * abs(mu) * ROUND_OFF), self.part)
         return load, left
-
-
-def mesh_of_frequencies(
-    scene: Scene, formulation: str, plan: Plan, accuracy: float, comm: MPI.Comm
-) -> tuple[Discretization, float]:
-    """Discretisation on which frequencies change by less than the accuracy if it is refined, and by how much."""
-    loads, number = np.linspace(*plan.load_range(scene), 3), plan.spectrum or FREQUENCIES
-    mesh = replace(start_mesh(scene, formulation, accuracy, comm), vertices=None)
-    system = System(scene, mesh, comm)
-    values, symmetries = _frequencies(system, loads, number), system.symmetries
-    best, least, worse = mesh, np.inf, 0
-    for _ in range(8):
-        finer = replace(mesh, elements=ceil(1.5 * mesh.elements))
-        richer = _frequencies(System(scene, finer, comm, symmetries=symmetries), loads, number)
-        change = max(_change(v[:number], w, scene.units.omega2) for v, w in zip(values, richer, strict=True))
-        best, least, worse = (mesh, change, 0) if change < least else (best, least, worse + 1)
-        if worse >= (3 if least > 1e-6 else 1) or least < accuracy / 10:  # less is round-off: one is enough
-            break
-        mesh, values = finer, richer
-    return best, least
-
-
-def _frequencies(system: System, loads: np.ndarray, number: int) -> list[np.ndarray]:
-    """Eigenvalues mu nearest the origin at each of the loads, two more than ``number``."""
-    solver = BranchSolver(system)
-    eigensolver = NonsymmetricSolver(solver.system)
-    x, _ = first_state(solver, float(loads[0]))
-    found = []
-    for load in loads:
-        x = at_load(solver, x, float(load))
-        values = eigensolver.at(x).nearest(number + 2, SHIFT * system.scene.units.omega2).values
-        found.append(values[np.argsort(abs(values))][: number + 2])
-    if min(map(len, found)) < number:
-        raise ConvergenceError(
-            f"The coarsest mesh has fewer than {number} frequencies: ask for fewer (Plan(spectrum=...))."
-        )
-    return found
-
-
-def _change(values: np.ndarray, richer: np.ndarray, one: float) -> float:
-    """Largest distance of values from the nearest of the richer ones, relative to values greater than ``one``."""
-    return max(float(abs(richer - v).min() / unit(v, one=one)) for v in values)

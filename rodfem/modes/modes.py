@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -33,11 +33,7 @@ from rodfem.file_format import MODES
 from rodfem.problem.arguments import checked, text, whole
 from rodfem.problem.arguments import path as argument_path
 from rodfem.problem.quaternions import directors
-from rodfem.problem.setting import Setting, read
 from rodfem.whole_files import with_added, write_whole
-
-if TYPE_CHECKING:
-    from rodfem.problem.scene import Scene
 
 SYMMETRY, RIGID = "symmetry", "rigid motion"
 """Names of the motion in a symmetry mode, and in one of a rod that nothing holds, under loads without a potential."""
@@ -95,11 +91,8 @@ class Modes:
         )
 
 
-def save_modes(
-    modes: Modes, path: Path, branch: str, row: int, about: Mapping[str, Any], *, first: bool, scene: Scene
-) -> None:
+def save_modes(modes: Modes, path: Path, branch: str, row: int, about: Mapping[str, Any], *, first: bool) -> None:
     """Append the ``modes`` of a ``row`` of a ``branch`` to a file (``first``: a new one), on one rank."""
-    from rodfem.problem.supports import write, write_section  # they need UFL, which pictures do not
 
     def add(file: h5py.File) -> None:
         if first:
@@ -112,9 +105,6 @@ def save_modes(
         group.attrs["note"] = modes.note
         group.attrs["rates"] = modes.rates
         group["motion"] = np.array(modes.motion, dtype=h5py.string_dtype())
-        if first:
-            write_section(file, scene)
-        write(group, scene, [{name: getattr(modes, name) for name in ("load", "s", "r", "q")}])
 
     write_whole({path: with_added(path, add, first=first)})
 
@@ -139,18 +129,6 @@ def rows_with_modes(path: Path) -> list[tuple[str, int]]:
         return []
     with MODES.opened(path, ("branches",)) as file:
         return [(name, int(row)) for name, rows in file["branches"].items() for row in rows]
-
-
-def load_setting(path: Path, branch: str, row: int) -> Setting:
-    """Supports and loads of the rod whose modes are in a file, as far as it has them."""
-    with MODES.opened(path) as file:
-        return read(file[f"branches/{branch}/{row}"])
-
-
-def heading(path: Path) -> str:
-    """Title of the rod whose modes a file has, to begin a caption with."""
-    with MODES.opened(path) as file:
-        return f"{file.attrs['title']}, " if "title" in file.attrs else ""
 
 
 class Few(NamedTuple):

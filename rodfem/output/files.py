@@ -8,7 +8,6 @@ natural order along the rod, whatever the number of ranks: to draw them, or to s
 
 from __future__ import annotations
 
-import ctypes
 import json
 import platform
 import shlex
@@ -110,26 +109,13 @@ def versions() -> dict[str, str]:
     """Versions of Python and of the libraries that compute, each by its name in lower case."""
     from slepc4py import SLEPc  # after what compat loads first
 
-    found = {
+    return {
         "python": platform.python_version(),
         "dolfinx": compat.dolfinx.__version__,
         "petsc": ".".join(map(str, compat.PETSc.Sys.getVersion())),
         "slepc": ".".join(map(str, SLEPc.Sys.getVersion())),
-        "mumps": _mumps(),
         "numpy": np.__version__,
     }
-    return {name: version for name, version in found.items() if version}
-
-
-def _mumps() -> str:
-    """Version of the MUMPS that PETSc is linked with, by its ``MUMPS_SET_VERSION``; nothing where it has none."""
-    try:
-        ask = ctypes.CDLL(compat.PETSc.__file__).mumps_set_version_
-    except (AttributeError, OSError):
-        return ""
-    text = ctypes.create_string_buffer(b" " * 31, 32)
-    ask(text, ctypes.c_size_t(31))
-    return text.value.decode("ascii").strip()
 
 
 def as_json(data: dict[str, Any]) -> bytes:
@@ -230,15 +216,6 @@ def _sample(path: Path, branch: str, row: int, formulation: str) -> dict[str, An
     unfit = f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json next to it."
     with STATES.opened(path, ("formulation", "branches"), unfit) as file:
         found, group = file.attrs["formulation"], file[f"branches/{branch}"]
-        first = file.attrs.get("format_version", 1) == 1
         if found != formulation:
             raise InputError(f"{path} holds states of the {found} formulation: choose that, not {formulation}.")
-        sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
-        return dict(_of_first(name, value) for name, value in sample.items()) if first else sample
-
-
-def _of_first(name: str, value: Any) -> tuple[str, Any]:
-    """Entry of a state of version 1, which has ``p0`` for ``p1``, and twice the moments at the ends."""
-    if name[0] == "p" and name[1:].isdigit():
-        return f"p{int(name[1:]) + 1}", value
-    return name, value / 2 if name[:2] in ("ma", "mb") and name[2:].isdigit() else value
+        return {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}

@@ -180,11 +180,10 @@ def striped(
     section: tuple[Floats, Floats] | None,
     radius: float,
     colors: Sequence[str],
-    sides: int = 2 * SIDES,
 ) -> list[Solid]:
-    """A rod of a mean ``radius`` and so many ``sides`` with a stripe along d1, in two ``colors``."""
+    """A rod of a mean ``radius`` with a stripe along d1, in two ``colors``."""
     s, centres, frames = pose
-    around = (1.0, np.linspace(-np.pi, np.pi, sides + 1)[:-1]), (1.02, np.linspace(-0.3, 0.3, sides // 6 + 1))
+    around = (1.0, np.linspace(-np.pi, np.pi, 49)[:-1]), (1.02, np.linspace(-0.3, 0.3, 9))
     outlines = [size * radius * profile_of(s, section, angles) for size, angles in around]
     rings = [centres[:, None] + np.einsum("nij,nkj->nki", frames[:, :, :2], outline) for outline in outlines]
     return [Solid(*_loft(ring), color) for ring, color in zip(rings, colors, strict=True)]

@@ -181,9 +181,9 @@ def _write(plotter: Any, caption: str, notes: Sequence[str], solids: Sequence[So
 # --- from where a rod is seen
 
 
-def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats, load: Floats | None = None) -> Floats:
+def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats) -> Floats:
     """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), in its ``setting``."""
-    load, feet = setting.force if load is None else load, sum(bool(x.held.any()) for x in setting.supports) > 1
+    load, feet = setting.force, sum(bool(x.held.any()) for x in setting.supports) > 1
     along = {"axis": axis_of(setting, reference), "down": setting.gravity, "side": setting.widest(frame)}
     return view_of(reference, moved, load=load, feet=feet, **along)
 

@@ -32,8 +32,6 @@ ROD, STRIPE, FIRST, SECOND = "#9CC4E6", "#1F3A5F", "#D55E00", "#009E73"
 """A rod in space, the line along d1 on it, and arrows along d1 and d2."""
 GREY, DARK, STEEL, LOAD = "#9A9A9A", "#6E6E6E", "#707C8A", "#B3123E"
 """What holds a rod, its axles and strings, springs and rails, and loads."""
-REST, GROWS, SWINGS, FREE = "#B4B4B4", "#D55E00", "#0072B2", "#009E73"
-"""A rod at rest in a picture of its modes, and modes that grow, swing, or cost no energy."""
 LINES: dict[str, dict[str, Any]] = {
     STABLE: {"linestyle": "-", "linewidth": 3.0, "solid_capstyle": "round"},
     PLANAR: {"linestyle": (0, (3.2, 1.0)), "linewidth": 2.4},

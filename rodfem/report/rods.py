@@ -16,10 +16,9 @@ from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
 from rodfem.modes.modes import RIGID, SYMMETRY, Few, exponent, load_modes, rows_with_modes, typical_of
-from rodfem.output.glyphs import Look, body_of, glyphs_of, profile_of
+from rodfem.output.glyphs import POINT, Look, body_of, glyphs_of, profile_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
-from rodfem.output.plot_modes import GROWTH, drawn_size
 from rodfem.output.render import state_in, thickness
 from rodfem.output.states import POINTS, PROFILES, curve_at, profiles_of
 from rodfem.output.style import PALETTE
@@ -33,6 +32,9 @@ from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
 
 Floats = NDArray[np.float64]
 
+LARGEST = 0.14, 0.9
+"""Drawn displacement over the rod's size, and rotation in radian, of which the one that is reached first holds."""
+GROWTH = 1e-9  # real part of the root of -mu, relative to it, above which a mode grows
 ZERO = 1e-7  # a force or moment below this, relative to the natural force or moment, is the error of Newton's method
 OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
 """Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
@@ -241,6 +243,12 @@ def motions_of(
         drawn = [packed(np.concatenate(part, axis=1)) for part in parts]
         out.append(_caption(mode) | {"parts": drawn, "maps": [moved(*part) for part in parts]})
     return out
+
+
+def drawn_size(u: NDArray[Any], w: NDArray[Any], span: float) -> float:
+    """Factor with which a mode of displacement ``u`` and rotation ``w`` (n, 3) is drawn, of a rod of size ``span``."""
+    moved, turned = (float(np.linalg.norm(abs(part), axis=1).max()) for part in (u, w))
+    return min(LARGEST[0] * span / max(moved, POINT * span), LARGEST[1] / max(turned, POINT))
 
 
 def _caption(mode: DrawnMode) -> dict[str, Any]:

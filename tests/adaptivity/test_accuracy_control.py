@@ -7,22 +7,19 @@ from pathlib import Path
 import boundary_layer
 import classics
 import closed_form_hemitropic
-import closed_forms
 import demo_cases
 import h5py
 import hemitropic_cases
 import numpy as np
 import pytest
 import reference_values
-import ufl
 from mpi4py import MPI
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from rodfem import Branch, Diagram, InputError, Plan, Scene, Solver, clamped, free, run, trace
-from rodfem.continuation.kinds import BRANCH_POINT, FLUTTER, FOLD, USER
+from rodfem import Branch, Diagram, InputError, Plan, Scene, Solver, run, trace
+from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
 from rodfem.fem.fields import Discretization, Fields
-from rodfem.forms.energy import bending_and_twist
 from rodfem.output.files import load_state
 
 ACCURACIES = pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-10])
@@ -167,38 +164,10 @@ def test_bad_accuracy(accuracy: float) -> None:
         Plan(scene.span, accuracy=accuracy).check(scene)
 
 
-@pytest.mark.long
-def test_accuracy_of_a_sweep_of_a_soft_notch() -> None:
-    """Coarse meshes do not see it: the first refinement changes less than the second.  By 200 Hermite elements."""
-    softness = lambda s: 0.9 * ufl.exp(-(((s - 0.31) / 0.03) ** 2))  # noqa: E731
-    rod = classics.column(
-        "notch",
-        (clamped(), free(follower=classics.push)),
-        (15.0, 20.0),
-        energy=lambda v, k, c: (1 - softness(c.s)) * bending_and_twist(k, (1.0, 30.0, 10.0)),
-        inertia=classics.BEAM,
-    )
-    (flutter,) = trace(rod, plan=Plan(accuracy=1e-2, depth=0)).special(FLUTTER)
-    assert flutter.point.load == pytest.approx(17.9732, rel=1e-3) and not flutter.note
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("accuracy", "number"), [(1e-3, 6), (1e-6, 12)])
-def test_accuracy_of_a_sweep(accuracy: float, number: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """All frequencies, and the flutter load, against the frequency equation of Beck's column (good to 1e-7)."""
+def test_a_sweep_has_one_mesh() -> None:
     scene = demo_cases.scene("follower")
-    folder = MPI.COMM_WORLD.bcast(tmp_path)
-    plan = Plan((15.0, 25.0), accuracy=accuracy, spectrum=number)
-    (branch,) = run(scene, plan=plan, output=folder, figures=False)
-    out = capfd.readouterr().out
-    assert MPI.COMM_WORLD.rank or f"for an accuracy of {accuracy:g}: with half as many more" in out
-    (flutter,) = [s for s in branch.special if s.kind == FLUTTER]
-    assert abs(flutter.point.load / closed_forms.double(20.0, 120.0)[0] - 1) < accuracy
-    assert not flutter.note
-    for point in branch.points[::25]:
-        for mu in (complex(*parts) for parts in point.omega2):
-            planes = closed_forms.column(mu, point.load), closed_forms.column(mu, point.load, EI=10.0)
-            assert np.nanmin(np.abs(np.array(planes) - mu)) < accuracy * abs(mu)
+    with pytest.raises(InputError, match="is swept on one mesh"):
+        Plan(scene.span, accuracy=1e-4).check(scene)
 
 
 @pytest.mark.parametrize("words", [("--elements", "8"), ("--degree=6",), ("--elem", "8")])

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
-import h5py
 import pytest
-import ufl
 from classics import column
 
 import rodfem
@@ -21,11 +18,7 @@ from rodfem import (
     Plan,
     Scene,
     clamped,
-    everywhere,
     free,
-    hinged,
-    sliding,
-    trace,
 )
 from rodfem.continuation.kinds import EVENT
 from rodfem.errors import InputError
@@ -64,14 +57,6 @@ def test_another_rod_has_another_fingerprint(rod: Scene, other: Scene) -> None:
     assert same(first, again) and not same(first, last)
 
 
-def test_a_fingerprint_of_an_older_file() -> None:
-    """It has residual, energy and ordinate at both ends of the range of the scene: these are compared."""
-    numbers = {e: fingerprint(System(crooked(e), MESH), (0.0, 6.0)) for e in (0.0, 0.05)}
-    older = numbers[0.05][:6]
-    assert same(older, numbers[0.05]) and same(older, numbers[0.0])
-    assert not same([1.01 * x if x is not None else x for x in older], numbers[0.05])
-
-
 @pytest.mark.long
 @pytest.mark.usefixtures("few_loads")
 def test_a_diagram_that_is_read_keeps_its_plan(folder: Path) -> None:
@@ -87,25 +72,3 @@ def test_a_diagram_that_is_read_keeps_its_plan(folder: Path) -> None:
     with pytest.raises(InputError, match="had events of its own, which no file holds"):
         read.again()
     assert read.again(events=(tip,)).special(EVENT)
-
-
-@pytest.mark.alone
-def test_files_of_version_1(folder: Path) -> None:
-    """They have the multiplier ``p0`` for ``p1``, twice the moments at the ends, and residuals with these."""
-    end = sliding((0.0, None, None), lambda c: (ufl.cos(c.P / 2), 0.0, 0.0, ufl.sin(c.P / 2)))
-    kept = (everywhere(lambda x, c: x.k[0], strain=True),)
-    scene = column("turned", (hinged((1.0, 0.0, 0.0)), end), (0.0, 0.5), constants={"C": 2.0}, constraints=kept)
-    diagram = trace(scene, plan=Plan(error_bars=False, depth=0), discretization=MESH)
-    diagram.save(folder)
-    data = json.loads((folder / "diagram.json").read_text())
-    data["format"]["version"] = 1
-    data["asked"]["equations"] = fingerprint(diagram.solvers[0].system, (0.0, 0.5), 1)
-    (folder / "diagram.json").write_text(json.dumps(data))
-    with h5py.File(folder / "states.h5", "a") as file:
-        file.attrs["format_version"], states = 1, file["branches/straight"]
-        states.move("p1", "p0")
-        assert states["mb3"][-1] == pytest.approx(-1.0)  # the rod exerts it, C = 2 at half a radian
-        for name in ("ma1", "ma2", "mb1", "mb2", "mb3"):
-            states[name][...] = 2.0 * states[name][...]
-    before, now = (d["straight"].points[-1] for d in (diagram, rodfem.load(folder, scene)))
-    assert (now.x - before.x).norm() < 1e-12

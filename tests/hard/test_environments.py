@@ -4,12 +4,8 @@ Each is either no trouble, or one sentence.
 """
 
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +15,6 @@ from app.test_run_command import SCENE
 from ffcx.codegeneration import jit
 from mpi4py import MPI
 
-import rodfem
 from rodfem import compat
 from rodfem.fem import form_compiler
 
@@ -27,11 +22,10 @@ RUN = "import sys; from rodfem.app.console import main; main(sys.argv[1:])"
 SMALL = ("--step", "0.15", "--no-figures", "--elements", "4", "--degree", "2", "--depth", "0")
 
 
-def run(*words: str, before: tuple[str, ...] = (), **environment: str | None) -> subprocess.CompletedProcess[str]:
-    """Run ``rodfem`` with these words in a process of its own, whose environment differs in this; None unsets."""
-    env = {name: value for name, value in (os.environ | environment).items() if value is not None}
-    env["PYTHONPATH"] = str(Path(__file__).parents[2])
-    command = [*before, sys.executable, "-c", RUN, *words]
+def run(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run ``rodfem`` with these words in a process of its own, whose environment differs in this."""
+    env = os.environ | environment | {"PYTHONPATH": str(Path(__file__).parents[2])}
+    command = [sys.executable, "-c", RUN, *words]
     return subprocess.run(command, env=env, capture_output=True, encoding="utf-8", timeout=300, check=False)
 
 
@@ -71,38 +65,6 @@ def test_a_cache_that_cannot_be_made(rod: Path) -> None:
     said = one_sentence(run("run", str(rod), *SMALL, XDG_CACHE_HOME=str(rod)))
     assert f"The folder {rod}/fenics, which keeps compiled code, cannot be written" in said
     assert "set XDG_CACHE_HOME" in said
-
-
-@contextmanager
-def open_to_all() -> Iterator[Path]:
-    """A folder that other users see, which those of pytest are not, with a scene and a folder that they may write."""
-    with tempfile.TemporaryDirectory() as name:
-        place = Path(name)
-        place.chmod(0o755)
-        (place / "rod.py").write_text(SCENE)
-        (place / "open").mkdir()
-        (place / "open").chmod(0o777)
-        yield place
-
-
-def as_user(number: int) -> tuple[str, ...]:
-    """What goes before a command that another user runs; skips the test where that is not possible."""
-    if os.getuid() != 0 or shutil.which("setpriv") is None:
-        pytest.skip("needs another user")
-    before = ("setpriv", f"--reuid={number}", f"--regid={number}", "--clear-groups")
-    reached = [*before, sys.executable, "-c", f"import ufl, rodfem; assert rodfem.__file__ == {rodfem.__file__!r}"]
-    env = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
-    if subprocess.run(reached, env=env, cwd="/", capture_output=True, check=False).returncode:
-        pytest.skip("another user does not reach this Python")
-    return before
-
-
-def test_a_user_without_a_home() -> None:
-    unknown = as_user(12345)
-    with open_to_all() as place:
-        words = ("run", str(place / "rod.py"), *SMALL, "--output", str(place / "open" / "rod"))
-        said = one_sentence(run(*words, before=unknown, HOME=None, XDG_CACHE_HOME=None))
-        assert "This user has no home folder" in said and "set XDG_CACHE_HOME" in said
 
 
 # --- a cache that is broken -----------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from rodfem import Discretization, InputError, Parameter, Plan, Scene, Solver, m
 from rodfem.continuation.branch import Unexplained
 from rodfem.file_format import DIAGRAM, FORMATS, LOCUS, MODES, PROGRAM, RESULT, STATES
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output import plot_modes, render
+from rodfem.output import render
 from rodfem.output.files import load_state
 from rodfem.output.plot_locus import draw_locus
 
@@ -323,7 +323,6 @@ def read(folder: Path) -> list[Callable[[], Any]]:
         lambda: load_state(folder / "states.h5", *at, Solver(euler, MESH).equilibria),
         lambda: render.read_state(folder / "states.h5", *at),
         lambda: rodfem.load_modes(folder / "modes.h5", *modes),
-        lambda: plot_modes.draw_modes(folder / "modes.h5", *modes, folder / "modes.png"),
         lambda: draw_locus([json.loads(locus.read_text())], folder / "locus.png"),
         lambda: many([euler], counted, folder),
     ]
@@ -354,9 +353,7 @@ def test_files_say_what_they_are(copied: Path) -> None:
 def test_files_of_a_newer_version_are_refused(copied: Path) -> None:
     for form in FORMATS:
         marked(copied / NAMES[form], form.version + 1)
-    sentence = (
-        rf"was written by rodfem 9\.1, in version [23] of the format 'rodfem \w+', and {PROGRAM} reads versions up to"
-    )
+    sentence = rf"was written by rodfem 9\.1, in version [23] of the format 'rodfem \w+', and {PROGRAM} reads version"
     for reader in read(copied):
         with pytest.raises(InputError, match=sentence):
             reader()

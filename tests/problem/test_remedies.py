@@ -18,7 +18,7 @@ from rodfem.fem.formulations import AUTO, FORMULATIONS
 
 HOME = Path(__file__).parents[2] / "rodfem"
 COMMAND_LINE = ("app/cli.py", "app/main.py", "app/console.py")
-PROGRAMS = (*COMMAND_LINE, "output/plot_modes.py", "output/plot_diagram.py", "output/render.py")
+PROGRAMS = (*COMMAND_LINE, "output/plot_diagram.py", "output/render.py")
 """Modules that are run themselves, and may know their own options."""
 
 pytestmark = pytest.mark.versions
