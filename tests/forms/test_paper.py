@@ -20,6 +20,7 @@ from rodfem.forms.lagrangian import pointwise, reduced
 from rodfem.forms.loads import follower_work
 from rodfem.forms.rotation import product, rotation
 
+
 def energy(v: Any, k: Any) -> Any:
     """Of no particular form: all of v and k are coupled."""
     coupled = (v[0] * k[1] - 0.3 * v[2] * k[2]) ** 2
@@ -211,8 +212,6 @@ def test_40_to_the_letter(seed: int) -> None:
     assert d3 @ (x.eta_s - np.cross(x.psi, x.r_s)) == pytest.approx(beta)  # (43)
 
 
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_acceleration_of_the_curve_is_a_change_of_length(seed: int) -> None:
     """Polarised, it is ``-1/4 theta1 . theta2 q``: the unit norm term's share in the Hessian, times minus eta."""
@@ -233,22 +232,4 @@ def hamilton(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 # --- on a finite element space ---------------------------------------------------------------------------------
 
 
-
-
-
-
-
-
 # --- as elements shrink ------------------------------------------------------------------------------------------
-
-
-
-
-
-
-
-
-
-
-
-
