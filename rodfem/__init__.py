@@ -31,46 +31,21 @@ attachments, constraints, loads, tables.  :func:`trace` returns a :class:`Diagra
 arrays.
 
 This module loads nothing by itself, so that files can be drawn without MPI; its names are loaded when they are used.
-Type checkers read ``__init__.pyi``.
+``__init__.pyi`` says from where, here and to type checkers.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    name: home
-    for home, names in {
-        "codim2.locus": "Locus",
-        "problem.ends": "End clamped pinned sliding hinged sliding_hinge circular_guide free elastic Ring",
-        "problem.contribution": "Attachment Constraint integral at everywhere tendon",
-        "problem.scene": "Scene Parameter Ordinate Inertia Drag",
-        "problem": "section",
-        "problem.table": "tabulated path",
-        "problem.field": "Field",
-        "fem.fields": "Discretization",
-        "diagram.plan": "Plan",
-        "continuation.follow": "StepControl IndexStepControl",
-        "problem.events": "Event Level",
-        "app.run": "run",
-        "diagram.diagram": "trace Diagram",
-        "diagram.saved": "load",
-        "diagram.solver": "Solver",
-        "continuation.observer": "Observer",
-        "continuation.branch": "Branch Point SpecialPoint",
-        "app.many": "family many",
-        "app.design": "design Design",
-        "app.identify": "identify Identified",
-        "modes.modes": "Modes load_modes",
-        "errors": "InputError SceneError ConvergenceError SetupError",
-        "output.files": "load_json",
-    }.items()
-    for name in names.split()
-}
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+_HOMES = {name: home for home, name in re.findall(r"^from rodfem\.([\w.]+) import (\w+) as", _STUB, re.MULTILINE)}
 _NAMES = sorted(_HOMES)
 
 __doc__ = f"{__doc__ or ''}\nPublic names, by module (``help(rodfem.Scene)`` describes one of them):\n\n" + "\n".join(

@@ -1,4 +1,4 @@
-# The public names as type checkers read them; rodfem/__init__.py loads each from the same module when it is used.
+# The public names as type checkers read them; rodfem/__init__.py reads them here, and loads each when it is used.
 
 __version__: str
 
@@ -13,7 +13,6 @@ from rodfem.codim2.locus import Locus as Locus
 from rodfem.continuation.branch import Branch as Branch
 from rodfem.continuation.branch import Point as Point
 from rodfem.continuation.branch import SpecialPoint as SpecialPoint
-from rodfem.continuation.follow import IndexStepControl as IndexStepControl
 from rodfem.continuation.follow import StepControl as StepControl
 from rodfem.continuation.observer import Observer as Observer
 from rodfem.diagram.diagram import Diagram as Diagram

@@ -54,7 +54,6 @@ class Deflation:
     """Search for equilibria at one ``load``, on the mesh of a ``solver``, other than the ``known`` ones at that load.
 
     New ones are ``found``, one of each set that the symmetries carry into each other; ``tries`` are the outcomes.
-    ``nearly`` counts those that are nearly mirror images of others, which an imperfection makes different ones.
     """
 
     def __init__(self, solver: BranchSolver, load: float, known: Sequence[Point] = (), seed: int = 0) -> None:
@@ -71,7 +70,7 @@ class Deflation:
         self.start = solver.start(load)
         self.mirrors = mirrors(self.solver.shape, self.start)
         self.bases, self.energies = list[PETSc.Vec](), list[float]()
-        self.found, self.tries, self.nearly = list[Point](), list[str](), 0
+        self.found, self.tries = list[Point](), list[str]()
         for point in known:
             self._deflate(point.x)
 
@@ -79,10 +78,9 @@ class Deflation:
         """Return the counts, and what they do not prove, in a few lines."""
         words = ", ".join(f"{self.tries.count(outcome)} {outcome}" for outcome in (NEW, KNOWN, INADMISSIBLE, FAILED))
         images = "; ".join(m.in_words() for m in self.mirrors) or "none"
-        nearly = f"  {self.nearly} new: nearly, but not exactly, mirror images of others\n" if self.nearly else ""
         where = f"{self.system.scene.load} = {self.load:.10g}"
         return (
-            f"Further equilibria at {where} by deflation, {len(self.tries)} tries: {words}\n{nearly}"
+            f"Further equilibria at {where} by deflation, {len(self.tries)} tries: {words}\n"
             f"  states that a symmetry carries into each other count as one (mirror images: {images})\n"
             "  no proof that there are no others: more tries or another seed may find some"
         )
@@ -168,28 +166,12 @@ class Deflation:
         return False
 
     def _deflate(self, x: PETSc.Vec) -> None:
-        """Add a state and its mirror images to what is known.
-
-        An imperfection below what the test of the mirrors sees makes the image another equilibrium, with another
-        energy: a pole next to its root would hide it from Newton's method.  Then the mirror goes.
-        """
+        """Add a state and its mirror images to what is known."""
         self.bases.append(x)
-        self.energies.append(energy := self.solver.energy(x))
-        if self.known.distance(x) > APART:
-            self.known.add(x)
-        for mirror in list(self.mirrors):
-            image = mirror(self.solver.shape, x)
-            if mirror not in self.mirrors or self.known.distance(image) <= APART:
-                continue
-            point, _ = self._judge(image)
-            scale = max(abs(energy), self.solver.inertia.scale)
-            if point is None or abs(point.energy - energy) <= NEGLIGIBLE * scale:
+        self.energies.append(self.solver.energy(x))
+        for image in (x, *(mirror(self.solver.shape, x) for mirror in self.mirrors)):
+            if self.known.distance(image) > APART:
                 self.known.add(image)
-                continue
-            self.found.append(point)
-            self.nearly += 1
-            self.mirrors.remove(mirror)
-            self._deflate(point.x)
 
     def _judge(self, x: PETSc.Vec) -> tuple[Point | None, str]:
         """Polish a candidate by the plain Newton method; the point, if it is a new equilibrium, and the outcome."""

@@ -33,7 +33,7 @@ def test_a_reader_that_leaves_ends_the_program_quietly(tmp_path: Path, kind: str
     assert run.returncode == -13
 
 
-@pytest.mark.parametrize("words", ["help", "explain", "list nowhere", "run own.py --help"])
+@pytest.mark.parametrize("words", ["help", "explain", "info nowhere", "run own.py --help"])
 def test_commands_end_without_a_word(tmp_path: Path, words: str) -> None:
     """Nobody reads from the first character on."""
     shutil.copy(CHECK.parents[2] / "demos" / "cord.py", tmp_path / "own.py")
@@ -42,4 +42,4 @@ def test_commands_end_without_a_word(tmp_path: Path, words: str) -> None:
     os.close(reader)
     run = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, cwd=tmp_path, check=False)
     os.close(writer)
-    assert run.stderr == "" if words != "list nowhere" else run.stderr.startswith("error: No folder in nowhere")
+    assert run.stderr == "" if words != "info nowhere" else run.stderr.startswith("error: There is no nowhere")

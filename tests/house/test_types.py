@@ -1,6 +1,5 @@
 """What a type checker, ``help`` and the interpreter's start make of the package from outside."""
 
-import ast
 import pydoc
 import re
 import subprocess
@@ -19,16 +18,6 @@ UNUSED = (
     *("scipy.optimize", "scipy.interpolate", "scipy.spatial", "scipy.integrate"),
 )
 """Modules that a run without pictures does not need, each a part of the time that a person waits for it."""
-
-
-def test_stub_and_lazy_exports_are_the_same() -> None:
-    """``__init__.pyi``, which type checkers read, against the table by which ``__init__.py`` loads names."""
-    lines = {f"from rodfem.{home} import {name} as {name}" for name, home in rodfem._HOMES.items()} | {
-        "__version__: str"
-    }
-    stub = {ast.unparse(statement) for statement in ast.parse((HOME / "rodfem" / "__init__.pyi").read_text()).body}
-    assert not lines - stub, "add to rodfem/__init__.pyi:\n" + "\n".join(sorted(lines - stub))
-    assert not stub - lines, "remove from rodfem/__init__.pyi:\n" + "\n".join(sorted(stub - lines))
 
 
 def test_no_public_name_is_a_module() -> None:
