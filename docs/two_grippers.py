@@ -50,6 +50,21 @@ def measured(folder: Path) -> dict[str, np.ndarray]:
     return {kind: rows[rows[:, 3] == number, :3] for number, kind in ((1, "jumped"), (0, "left gently"))}
 
 
+def compared(page: SimpleNamespace, data: dict[str, np.ndarray]) -> dict[str, float]:
+    """Differences of computed and measured curvatures in percent, and the number of rods whose kind is right."""
+    found = np.array([first_loss(page, C11, C22) for rows in data.values() for C11, C22, _ in rows])
+    kappa = np.vstack([*data.values()])[:, 2]
+    jumps = np.concatenate([np.full(len(rows), kind == "jumped") for kind, rows in data.items()])
+    off, part = found[:, 0] - kappa, 100 * (found[:, 0] / kappa - 1)
+    return {
+        "rms of the mean curvature": float(100 * np.sqrt(np.mean(off**2)) / kappa.mean()),
+        "rms of each": float(np.sqrt(np.mean(part**2))),
+        "mean": float(part.mean()),
+        "right": int(((found[:, 1] < 0) == jumps).sum()),
+        "experiments": len(kappa),
+    }
+
+
 def change_of_kind(page: SimpleNamespace, C22: float) -> float:
     """Ratio C11 at which the coefficient vanishes, to the right of a path on which the rod leaves gently."""
 
@@ -64,22 +79,16 @@ def change_of_kind(page: SimpleNamespace, C22: float) -> float:
 def main(folder: Path) -> None:
     """Compute, print and draw."""
     page, data = program(), measured(folder)
-    errors, right, count = [], 0, 0
     figure = Figure(figsize=(7.0, 4.2), dpi=150, layout="constrained")
     axes = figure.subplots()
     for (kind, rows), mark in zip(data.items(), ("s", "o"), strict=True):
-        found = np.array([first_loss(page, C11, C22) for C11, C22, _ in rows])
-        errors.extend(found[:, 0] / rows[:, 2] - 1)
-        right += int(((found[:, 1] < 0) == (kind == "jumped")).sum())
-        count += len(rows)
         axes.plot(rows[:, 0], rows[:, 1], mark, ms=4, label=f"experiment: {kind}")
     curve = [change_of_kind(page, C22) for C22 in CURVE]
     axes.plot(curve, CURVE, color="black", label="computed: the pitchfork's coefficient vanishes")
     axes.set(xlabel=r"$C_{11} = \tau/\kappa$", ylabel=r"$C_{22} = \omega/\kappa$")
     axes.legend(frameon=False)
     figure.savefig(PAGE.with_suffix(".png"))
-    rms, mean = 100 * np.sqrt(np.mean(np.square(errors))), 100 * np.mean(errors)
-    print(f"rms {rms:.1f} %, mean {mean:+.1f} %; {right} of {count}")
+    print(*(f"{what}: {value:.3g}" for what, value in compared(page, data).items()), sep="\n")
     print(*zip(np.round(curve, 4), CURVE.round(3), strict=True))
 
 

@@ -133,6 +133,12 @@ assert real.special(branch="first branch") == [] and abs(snap.point.load - 2.576
 print(f"curvature {answer:.9f} (1/8); fold at {snap.point.load:.10f}, by Koiter {near(-at_fold(0.02), 0.02):.4f}")
 
 # %% [markdown]
+# *150 robots.* [Two grippers](../trades/two-grippers.md) drove a rod along 150 helical paths (Tong et al. 2022).
+# Each path ends at a pitchfork. If the coefficient of its law is positive the rod leaves gently, if it is negative it
+# jumps: right in 146 of 150. It leaves 1.3 % early in the mean, as no rod is perfect.
+# Its branch point is taken apart, but the law of the perfect rod tells what to expect.
+
+# %% [markdown]
 # ## Exercises
 #
 # **5.1** Hold the rod by $b \cdot \theta$, $b_i = s_i$: the stiffness $h = 1/(b \cdot S^{-1} b)$ has the slope
@@ -143,7 +149,7 @@ print(f"curvature {answer:.9f} (1/8); fold at {snap.point.load:.10f}, by Koiter 
 #
 # **5.3** A heavy column (exercise 2.2): $q = q_1(1 + c\,a^2)$. Find $c$, with $a$ the angle of the tip.
 #
-# **5.4** [Two robots](../trades/two-grippers.md): at which $\kappa$ does $C_{11} = 0.65$, $C_{22} = 0$ end, by a jump?
+# **5.4** At which $\kappa$ does the rod of these robots leave $C_{11} = 0.65$, $C_{22} = 0$, and does it jump?
 
 # %% [markdown]
 # ## Where it breaks

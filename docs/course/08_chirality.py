@@ -62,6 +62,7 @@ show(drawn[0].figure, "08_cord")
 # Compress a hemitropic rod of length 6 between clamps by the fraction $\lambda$. Straight, it has the stretch
 # $1-\lambda$, no twist, the thrust $10\lambda$ and, being chiral, a moment $A\lambda$ about its axis. For a small
 # rotation $\theta_1 + i\theta_2 = \theta$ of its cross-sections the second variation of the energy is
+#
 # $$\int |\theta'|^2 + A\lambda\;\mathrm{Im}(\bar\theta\,\theta') - P|\theta|^2\, ds, \qquad P = 10\lambda(1-\lambda),$$
 #
 # where $\theta = 0$ at the clamps, and $\int\theta\, ds = 0$ as they stay opposite each other.
