@@ -175,8 +175,10 @@ class Terminal(Report):
         for branch in diagram:
             for special, name in product(_to_follow(branch), sorted(asked)):
                 with self._guard(diagram, branch, special):
-                    found = special.derivative(name)
+                    found = special.derivative(name, along_the_rod=special.kind.singular)
                     special.derivatives[name] = found.value, found.error if bar else nan
+                    if found.acts_along(special.point.load):
+                        special.densities[name] = found.ends, found.density
 
     def _assess(self, diagram: Diagram) -> None:
         """Judge the states at the loads of the plan, each on its own mesh; save their modes."""

@@ -20,6 +20,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 from petsc4py import PETSc
@@ -46,6 +47,9 @@ their mean, are not equal by a symmetry."""
 FIRST = 1e-4  # first step of the secants, relative to the bounds, below which they end where they no longer shrink
 DIFFERENCE = 1e-3
 """Step of the central differences of ``D``, and of a count next to a divergence load, relative to the bounds."""
+CENTRAL = ((1.0, 0.5), (-1.0, -0.5))
+INWARD = ((0.0, -25 / 12), (1.0, 4.0), (2.0, -3.0), (3.0, 4 / 3), (4.0, -1 / 4))
+"""Places and weights of a central difference, and of one of the fourth order to one side."""
 Interval = tuple[float, float]
 Prediction = tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]
 """Parameters (2,) and state of a point that is expected, and their derivatives in arclength."""
@@ -305,15 +309,8 @@ class Collision(Criterion):
         system.line = plane.line(guess[0], across)
         t, last, here, x = self._collide(guess[1], Cluster(basis, self.mean(near)), reach)
         p, omega2 = guess[0] + t * across, self.squared(here)
-        gradient, clearest = np.zeros(2), here
-        for which, name in enumerate(plane.names):
-            system.line = plane.line(p, plane.axis(which))
-            # D has a pole at what is not admissible, as a mass of zero
-            room = min(abs(end - p[which]) for end in system.scene.parameters[name].admissible)
-            step = float(min(DIFFERENCE, room / 100 / plane.width[which]))
-            low, high = (self._measured(h, x, Cluster(basis, here.cluster.mean))[0] for h in (-step, step))
-            gradient[which] = (self.value(high) - self.value(low)) / (2 * step)
-            clearest = max((clearest, low, high), key=lambda m: m.spread)
+        slopes, around = zip(*(self._slope(which, p, x, here) for which in range(2)), strict=True)
+        gradient, clearest = np.array(slopes), max((here, *chain(*around)), key=lambda m: m.spread)
         if not np.linalg.norm(gradient):
             raise ConvergenceError("what vanishes on the curve is constant")
         split, large = self.split(here)
@@ -336,6 +333,24 @@ class Collision(Criterion):
             modes=as_vectors(system, basis),
             rest=rest + (here.cluster.size if omega2 < 0 else 0),
         )
+
+    def _slope(self, which: int, p: np.ndarray, x: PETSc.Vec, here: Measured) -> tuple[float, list[Measured]]:
+        """Derivative in parameter number ``which`` of what vanishes, by clusters around: at a bound within it alone."""
+        plane = self.plane
+        self.solver.system.line = plane.line(p, plane.axis(which))
+        # D has a pole at what is not admissible, as a mass of zero
+        ends = self.solver.system.scene.parameters[plane.names[which]].admissible
+        room = min(filter(None, (abs(end - p[which]) for end in ends)))
+        step = float(min(DIFFERENCE, room / 100 / plane.width[which]))
+        below, above = (abs(bound - p[which]) / plane.width[which] for bound in plane.intervals[which])
+        side = 1.0 if below < step else -1.0
+        stencil = INWARD if min(below, above) < step else CENTRAL
+        around = [
+            self._measured(side * place * step, x, Cluster(here.cluster.basis, here.cluster.mean))[0]
+            for place, _ in stencil
+        ]
+        parts = [weight * self.value(found) for found, (_, weight) in zip(around, stencil, strict=True)]
+        return side * sum(parts) / step, around
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
         """Zero on the system's line of parameters: by secants, the last digits by both subspaces."""

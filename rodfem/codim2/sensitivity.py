@@ -23,7 +23,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.normal_form import Origin, normal_form_of
 from rodfem.continuation.singular import SingularSystem
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.shape import halved
 from rodfem.fem.state import line
 from rodfem.output.words import number
@@ -65,6 +65,10 @@ class Derivative:
     def density_error(self) -> float:
         """Bound of the largest error of the density, nan without one."""
         return self._errors[1]
+
+    def acts_along(self, load: float) -> bool:
+        """Whether the parameter acts along the rod, so that another value somewhere changes the ``load`` visibly."""
+        return bool(abs(self.density @ np.diff(self.ends)) > ROUNDED * abs(load) if len(self.density) else False)
 
     def __repr__(self) -> str:
         known = "_errors" in vars(self)  # one rank may print
@@ -170,13 +174,24 @@ def _richer(special: SpecialPoint) -> Adjoint:
     return Adjoint(richer.solver, found.x, _states(richer.solver, special, modes))
 
 
+def _plane(solver: BranchSolver, parameter: str, load: float) -> Plane:
+    """Plane of the load and a parameter near its value, to one side where the scene has no rod on the other."""
+    known = solver.system.scene.parameters[parameter]
+    value = known.value
+    near, own = 0.05 * unit(load, one=solver.units.load), 0.05 * (abs(value) or 1.0)
+    a, b = (min(own, 0.5 * abs(end - value)) for end in known.admissible)
+    trouble = SceneError(f"{parameter} = {value:g} is the only value that is admissible: it has no derivative.")
+    for low, high in ((a, b), (0.0, b), (a, 0.0)):
+        try:
+            return Plane(solver.system, parameter, ((load - near, load + near), (value - low, value + high)))
+        except SceneError as refused:
+            trouble = refused
+    raise trouble
+
+
 def _on_locus(solver: BranchSolver, special: SpecialPoint, parameter: str) -> Derivative:
     """Derivative of a flutter or a divergence load: the slope of its locus."""
-    scene, load = solver.system.scene, special.point.load
-    known = scene.parameters[parameter]
-    room = min(abs(end - known.value) for end in known.admissible)
-    near, own = 0.05 * unit(load, one=solver.units.load), min(0.05 * (abs(known.value) or 1.0), 0.5 * room)
-    plane = Plane(solver.system, parameter, ((load - near, load + near), (known.value - own, known.value + own)))
+    plane = _plane(solver, parameter, special.point.load)
     with solver.system.clock.scope("locus"), restoration(solver.system):
         curve = Curve(solver, special, plane, doubtful=False)
     node = curve.first

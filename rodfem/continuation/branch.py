@@ -265,6 +265,9 @@ class SpecialPoint:
     derivatives: dict[str, tuple[float, float]] = field(
         default_factory=dict
     )  #: of the load, and bounds of their errors
+    densities: dict[str, tuple[np.ndarray, np.ndarray]] = field(
+        default_factory=dict
+    )  #: of these derivatives along the rod: ends (m + 1,) of pieces, and means (m,)
 
     @property
     def errors(self) -> dict[str, np.ndarray]:

@@ -63,6 +63,7 @@ OF_SPECIAL: dict[str, Source] = {
     "kind": lambda special: str(special.kind),
     "errors": lambda special: {name: plain(bar) for name, bar in special.errors.items()} or None,
     "derivatives": lambda special: {name: [*map(plain, pair)] for name, pair in special.derivatives.items()} or None,
+    "densities": lambda special: {name: [*map(plain, pair)] for name, pair in special.densities.items()} or None,
     "meets": lambda special: list(special.connects_to) if special.connects_to else None,
     "law": lambda s: None if s.law is None else {name: plain(value) for name, value in asdict(s.law).items()},
 }
@@ -166,6 +167,9 @@ def special_values(entry: Data) -> dict[str, Any]:
     read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")]
     values = {ATTRIBUTES.get(name, name): _number(entry.get(name)) for name in read}
     pairs = {name: tuple(map(_number, pair)) for name, pair in (entry.get("derivatives") or {}).items()}
+    values["densities"] = {
+        name: (np.array(s), np.array(means)) for name, (s, means) in (entry.get("densities") or {}).items()
+    }
     values |= {"derivatives": pairs, "resolved": entry.get("resolved"), "note": entry.get("note") or ""}
     values["connects_to"] = tuple(entry["meets"]) if entry["meets"] else None
     return values | {"law": _law(entry["law"]) if entry["law"] else None}

@@ -178,6 +178,7 @@ def _special(special: Data) -> dict[str, Any]:
         "law": (special.get("law") or {}).get("kind", ""),
         "note": special.get("note") or "",
         "drawn": bool(KINDS[special["kind"]].marker),
+        "densities": special.get("densities") or {},
     }
 
 

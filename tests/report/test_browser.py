@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -23,7 +24,8 @@ from PIL import Image
 from problem.test_docs import scenes
 from scipy.ndimage import uniform_filter
 
-from rodfem import Plan, run
+from rodfem import Parameter, Plan, run
+from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import POINT
 from rodfem.report.page import page_of, payload_of
 
@@ -92,6 +94,9 @@ def computed(folder: Path) -> None:
         run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
     plan = Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2)
     run(scenes()["euler"], MESH, plan, folder / "pinned", figures=False, quiet=True)
+    stiff = {"energy": lambda v, k, c: bending_and_twist(k, (c.EI, c.EI, 1.0)), "planar": "e1"}
+    column = replace(scenes()["euler"], parameters={"P": Parameter(0.0), "EI": Parameter(1.0)}, **stiff)
+    run(column, MESH, Plan(depth=0, sensitivity=True), folder / "column", figures=False, quiet=True)
     beck = demo_cases.scene("follower", span=(19.0, 21.0))
     run(beck, MESH, Plan(error_bars=False, locus=("J1", 0.0, 0.004)), folder / "beck", figures=False, quiet=True)
 
@@ -382,6 +387,30 @@ def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> No
     ]
     page.find_element(By.ID, "about-button").click()
     assert "dolfinx" in page.find_element(By.ID, "origin").text
+
+
+def test_the_rod_shows_where_to_stiffen_it(opened: Callable[..., Any]) -> None:
+    """Of a pinned column by 2 pi^2 sin^2 pi s: white at the hinges, red in the middle."""
+    page = opened("column")
+    script = "return import('report/data').then(({ data }) => data.branches[0].special)"
+    row = next(int(x["row"]) for x in page.execute_script(script) if x["kind"] == "branch point")
+    label, legend = (page.find_element(By.ID, f"stiffen-{part}") for part in ("label", "legend"))
+    page.execute_script(
+        "import('report/store').then((store) => store.select(0, arguments[0]))".replace("arguments[0]", str(row))
+    )
+    until(page, lambda: shown(page) == ("straight", row) and label.is_displayed())
+    plain = picture(page)
+    page.find_elements(By.CSS_SELECTOR, "#stiffen option")[1].click()
+    until(page, lambda: legend.is_displayed() and picture(page) != plain)
+    assert float(re.findall(r"to (\d+\.?\d*), most", legend.text)[0]) == pytest.approx(2 * np.pi**2, rel=0.02)
+    assert float(legend.text.split("s = ")[1]) == pytest.approx(0.5, abs=1 / 16)
+    script = "return import('report/stiffen').then((s) => [0, 0.25, 0.5, 1].map((t) => s.colours()(t)))"
+    blue = [int(re.findall(r"\d+", colour)[2]) for colour in page.execute_script(script)]
+    assert min(blue[0], blue[3]) > 240 and 100 < blue[1] < 200 and blue[2] < 50
+    svg = page.execute_async_script("import('report/rod').then((rod) => arguments[0](rod.vector()))")
+    assert len(set(re.findall(r'stroke="([^"]+)"', svg))) > 20
+    page.execute_script("import('report/store').then((store) => store.select(0, 0))")
+    until(page, lambda: not label.is_displayed() and not legend.is_displayed())
 
 
 def test_frequencies_come_first_for_a_follower_load(opened: Callable[..., Any]) -> None:

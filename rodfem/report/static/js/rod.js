@@ -8,6 +8,7 @@ import { moved, pointsOf } from "report/curve";
 import { amplitude, PERIOD } from "report/motion";
 import { drawOverlay } from "report/overlay";
 import { Solids } from "report/solids";
+import * as stiffen from "report/stiffen";
 import { framed, Stage } from "report/stage";
 import { Tube } from "report/tube";
 import { svgOf } from "report/vector";
@@ -57,6 +58,7 @@ function update(time = 0) {
     shape = moved(shape, mode.parts.map(values), a);
   }
   rod.update(shape);
+  rod.paint(stiffen.colours());
   stripe.update(shape);
   solids.update(numbers, maps, mode ? mode.maps.map(values) : [], a);
   first.update(mode ? shapeOf(b, state.row) : shapeOf(data.branches[0], 0));
@@ -127,7 +129,7 @@ export function picture(scale = 3) {
 
 // The same as SVG, without a mode.
 export function vector() {
-  const rods = [{ shape: shapeOf(branch(), state.row), colour: ROD, radius: data.radius, stripe: STRIPE }];
+  const rods = [{ shape: shapeOf(branch(), state.row), colour: ROD, colours: stiffen.colours(), radius: data.radius, stripe: STRIPE }];
   if (show.first.checked) rods.unshift({ shape: shapeOf(data.branches[0], 0), colour: FIRST, radius: data.radius, stripe: null });
   return svgOf(stage, rods, solids.visible ? solids.children.filter((mesh) => mesh.visible) : []);
 }
@@ -153,6 +155,10 @@ export function start() {
       update();
       redraw();
     });
+  stiffen.start(() => {
+    update();
+    redraw();
+  });
   subscribe(() => {
     update();
     if (outside()) look(true);

@@ -1,6 +1,6 @@
 // Surface of a rod: its cross-sections in the planes of d1 and d2.
 
-import { BufferAttribute, BufferGeometry, Mesh, MeshStandardMaterial, DoubleSide } from "three";
+import { BufferAttribute, BufferGeometry, Color, Mesh, MeshStandardMaterial, DoubleSide } from "three";
 import { refined } from "report/curve";
 
 const RINGS = 170;
@@ -14,6 +14,8 @@ export class Tube extends Mesh {
     [this.sections, this.sides] = outline.shape;
     this.outline = points;
     this.closed = closed;
+    this.own = colour;
+    this.painted = false;
     const lids = closed ? 2 * (this.sides + 1) : 0, count = this.rings * this.sides + lids;
     this.geometry.setAttribute("position", new BufferAttribute(new Float32Array(3 * count), 3));
     this.geometry.setAttribute("normal", new BufferAttribute(new Float32Array(3 * count), 3));
@@ -33,6 +35,21 @@ export class Tube extends Mesh {
       for (let j = 0; j < sides; j++) faces.push(first, first + 1 + j, first + 1 + ((j + 1) % sides));
     }
     return faces;
+  }
+
+  // Colour the rings by their part of the length, 0 to 1; null: all of its own colour.
+  paint(colours) {
+    const { material, geometry, sides, rings, closed } = this;
+    if (colours) {
+      const found = Array.from({ length: rings }, (_, i) => new Color(colours(i / (rings - 1))).toArray());
+      const all = [...found.flatMap((each) => Array(sides).fill(each)), ...(closed ? [found[0], found[rings - 1]].flatMap((each) => Array(sides + 1).fill(each)) : [])];
+      geometry.setAttribute("color", new BufferAttribute(new Float32Array(all.flat()), 3));
+    }
+    if (Boolean(colours) === this.painted) return;
+    this.painted = Boolean(colours);
+    material.vertexColors = this.painted;
+    material.color.set(this.painted ? "#ffffff" : this.own);
+    material.needsUpdate = true;
   }
 
   // Take the shape (r, q) at the stations.

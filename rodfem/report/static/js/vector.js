@@ -23,7 +23,7 @@ function d1Of([w, x, y, z]) {
 }
 
 // Pieces of a rod of this shape: each a line between two points, its stripe where that is on the side of the viewer.
-function* pieces(stage, { shape, colour, radius, stripe }) {
+function* pieces(stage, { shape, colour, colours, radius, stripe }) {
   const curve = refined(shape, TIMES), towards = stage.camera.getWorldDirection(new Vector3()).negate();
   const rings = Array.from({ length: curve.length / 7 }, (_, i) => {
     const part = curve.subarray(i * 7, i * 7 + 7), at = new Vector3().fromArray(part), q = part.subarray(3);
@@ -33,7 +33,8 @@ function* pieces(stage, { shape, colour, radius, stripe }) {
   const width = (2 * radius) / stage.pixel;
   for (let i = 0; i + 1 < rings.length; i++) {
     const [a, b] = [rings[i], rings[i + 1]];
-    yield { depth: (a.at[2] + b.at[2]) / 2, line: [a.at, b.at], stripe: a.seen && b.seen ? [a.side, b.side] : null, width, colour, dark: stripe };
+    const own = colours?.((i + 0.5) / (rings.length - 1)) ?? colour;
+    yield { depth: (a.at[2] + b.at[2]) / 2, line: [a.at, b.at], stripe: a.seen && b.seen ? [a.side, b.side] : null, width, colour: own, dark: stripe };
   }
 }
 
