@@ -10,7 +10,7 @@ from ufl.algorithms.analysis import extract_coefficients, extract_type
 from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
 from ufl.algorithms.apply_derivatives import apply_derivatives
 from ufl.algorithms.map_integrands import map_integrand_dags
-from ufl.classes import EQ, NE, ComplexValue, Condition, Indexed, Label, PositiveRestricted, ScalarValue, Sum, Variable
+from ufl.classes import Condition, Indexed, Label, PositiveRestricted, Sum, Variable
 from ufl.constantvalue import FloatValue
 from ufl.core.expr import Expr
 from ufl.corealg.multifunction import MultiFunction
@@ -19,8 +19,8 @@ from ufl.utils.stacks import StackDict
 
 import rodfem.forms  # noqa: F401, before UFL: see rodfem.forms.importing
 
-__all__ = ["EQ", "NE", "ComplexValue", "Condition", "Expr", "FloatValue", "Indexed", "Label", "MultiFunction"]
-__all__ += ["PositiveRestricted", "ScalarValue", "Sum", "Variable", "apply_algebra_lowering", "differentiated"]
+__all__ = ["Condition", "Expr", "FloatValue", "Indexed", "Label", "MultiFunction"]
+__all__ += ["PositiveRestricted", "Sum", "Variable", "apply_algebra_lowering", "differentiated"]
 __all__ += ["evaluated", "extract_coefficients", "extract_type", "map_integrand_dags", "parts"]
 
 

@@ -2,7 +2,10 @@
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
+
+from rodfem.linalg.matrices import shared, shared_matrix
 
 
 def chain_of_cells(
@@ -34,12 +37,12 @@ def random_chain(rng: np.random.Generator, *, symmetric: bool) -> tuple[np.ndarr
     return dense[np.ix_(order, order)], coupled[np.ix_(order, order)], int(border)
 
 
-def petsc(dense: np.ndarray, coupled: np.ndarray, comm: PETSc.Comm = PETSc.COMM_SELF) -> PETSc.Mat:
-    """Matrix with a given pattern, its rows in equal shares on the ranks."""
-    ranks, rank = comm.getSize(), comm.getRank()
-    begin, end = np.linspace(0, len(dense), ranks + 1).astype(int)[rank : rank + 2]
-    pattern = sp.csr_matrix(coupled[begin:end])
+def matrix_of(dense: np.ndarray, coupled: np.ndarray) -> PETSc.Mat:
+    """Matrix of compiled code with a given pattern."""
+    pattern = sp.csr_matrix(coupled)
     pattern.sort_indices()
-    size = (end - begin, len(dense))
-    values = dense[begin:end][pattern.nonzero()]
-    return PETSc.Mat().createAIJ((size, size), csr=(pattern.indptr, pattern.indices, values), comm=comm)
+    matrix = shared_matrix(MPI.COMM_SELF, pattern)
+    own = shared(matrix)
+    assert own is not None
+    own.values[:] = dense[pattern.nonzero()]
+    return matrix

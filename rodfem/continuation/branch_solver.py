@@ -35,7 +35,6 @@ from rodfem.fem.shape import Shape
 from rodfem.fem.state import LOAD, Energies, NodalValues, State
 from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
-from rodfem.linalg.chain import Chain
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.units import Units
 from rodfem.stability.in_space import InSpace
@@ -375,18 +374,6 @@ class BranchSolver:
         outcome = correct(self.system, x, self.axis, reach)
         self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
         return x, outcome
-
-    def notices(self) -> list[str]:
-        """Sentences for the record that nobody has read: factors by the last resort."""
-        out = list[str]()
-        for factors in [self.system.lu, self.inertia.factors] if self.conservative else [self.system.lu]:
-            if isinstance(factors, Chain) and factors.times:
-                out.append(
-                    f"{factors.times} matrices could not be factored along the rod, too many pivots were delayed: "
-                    "MUMPS factored them."
-                )
-                factors.times = 0
-        return out
 
     def point(
         self,

@@ -21,11 +21,9 @@ from rodfem.diagram.equilibria import check_index, first_state
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import ConvergenceError, InputError
-from rodfem.fem import form_compiler
 from rodfem.fem.checks import QuadratureCheck
 from rodfem.fem.fields import Discretization, check_number
 from rodfem.fem.system import System
-from rodfem.linalg.compiled import compile_ahead
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
 from rodfem.output.files import load_state
@@ -72,8 +70,6 @@ class Solver:
         ``clock`` notes times.  Raises :class:`~rodfem.errors.InputError` for a ``discretization`` that does not fit.
         """
         Plan(scene.span, spectrum=spectrum).check(scene, discretization or Discretization())
-        if form_compiler.ALONE:
-            compile_ahead("linalg/chain", "fem/assembly", "fem/newton")
         system = System(scene, discretization or Discretization(), comm, clock)
         self.equilibria = BranchSolver(system, spectrum if scene.conservative else 0)
 

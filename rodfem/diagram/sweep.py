@@ -147,8 +147,6 @@ class Sweep:
 
     def _take(self, branch: Branch, point: Point) -> None:
         """Find the eigenvalues of the next row; the step before the last one can be taken then."""
-        for notice in self.solver.notices():
-            self.observer.warn(notice)
         row = self._row(point)
         self._close(branch, row)
         self._rows = [*self._rows[-1:], row]

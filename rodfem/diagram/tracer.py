@@ -326,8 +326,6 @@ class Tracer:
         return equivalent(a, b, self.solver.units, max(tolerance, across), across**0.5)
 
     def _check_symmetry(self, point: Point) -> None:
-        for notice in self.solver.notices():
-            self.observer.warn(notice)
         if point.drift > DRIFT * self.solver.inertia.scale:
             self.control.drifting(point)
             raise ConvergenceError(

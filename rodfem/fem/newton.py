@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.linalg.chain import Chain, Elimination
+from rodfem.linalg.chain import Chain
 from rodfem.linalg.compiled import Memory, buffer, module
 from rodfem.linalg.matrices import EPS, shared
 
@@ -156,7 +156,7 @@ class OnPlane:
     def __call__(self, fresh: bool) -> Correction | None:
         """Move the state by one correction."""
         system, x = self.system, self.x
-        if self.compiled is not None and (fresh or not self.compiled.factors.resorted):
+        if self.compiled is not None:
             status, distance, size = self.compiled.iterate(x, self.row, fresh)
             if status != BROKEN:
                 return Correction(distance, size, fresh) if status == MOVED else None
@@ -308,16 +308,16 @@ class CompiledNewton:
         system, equations = self.system, self.system.equations
         equations.take(system.line)
         self.factors.prepare(self.matrix)
-        given = (self.factors.elimination, equations.residual.constants, equations.jacobian.constants)
+        given = (self.factors.pointer, equations.residual.constants, equations.jacobian.constants)
         if any(mine is not new for mine, new in zip(self._given, given, strict=True)):
-            self._use(given[0])
+            self._use()
             self._given = given
         self.active[:], self.offsets[:] = 0, system.phase.offsets
         for i, row in system.phase.rows.items():
             self.active[i], self.conditions[i, : len(row)] = 1, row
             self.forces[i, : len(row)] = system.phase.forces[i]
 
-    def _use(self, elimination: Elimination) -> None:
+    def _use(self) -> None:
         """Let the rod point to the forms with their constants, and to the factors."""
         system, rod, keep = self.system, self.rod, self.memory.keep
         residual, jacobian = system.equations.residual, system.equations.jacobian
@@ -327,12 +327,12 @@ class CompiledNewton:
             "jacobian": jacobian,
             "equation_places": system.equation_places,
             "entry_places": system.matrix_places(self._pattern, True),
-            "factors": elimination,
+            "factors": self.factors,
         }
         for name, owner in owners.items():
             setattr(rod, name, keep((rod, name), owner).pointer)
         rod.assemble = residual.function
-        rod.factor, rod.solve = elimination.functions
+        rod.factor, rod.solve = self.factors.functions
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Fill the matrix with ``S`` at ``x`` and a one for the load, and :attr:`border`; phase conditions stay."""
@@ -352,7 +352,7 @@ class CompiledNewton:
             with x as state:
                 status = self.lib.iterate(self.rod, newton, buffer(self.ffi, state), along, fresh)
         if newton.factored:
-            self.factors.adopt(regular=status == MOVED)
+            self.factors.regular = status == MOVED
             self.matrix.stateIncrease()
         return status, newton.distance, newton.size
 

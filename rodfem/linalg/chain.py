@@ -9,7 +9,6 @@ times as long, most of it for finding its way.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,13 +16,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.errors import ConvergenceError
 from rodfem.linalg.compiled import buffer, module
 from rodfem.linalg.factorization import Factors, Mumps, Sizes
-from rodfem.linalg.matrices import Entries
+from rodfem.linalg.matrices import Shared, shared
 
-CHAIN, MUMPS = "chain", "mumps"
-"""Names of what factors a rod's matrices."""
 LARGEST = 2000
 """Delayed pivots that a front may have: with more of them the matrix is no chain."""
 SINGULAR, TOO_LARGE = 1, 2
@@ -76,44 +73,37 @@ def _towards(couplings: sp.csc_matrix, along: np.ndarray) -> np.ndarray:
     return along[::-1] if (last + 1).sum() < (inner - first).sum() else along
 
 
-class GaveUpError(ConvergenceError):
-    """The elimination along the rod needs fronts that are too large: too many pivots were delayed."""
+class Chain:
+    """Factors of matrices of compiled code with one pattern, whose last ``border`` rows may couple to all others.
 
-
-class Elimination:
-    """The compiled elimination of matrices with one pattern (``starts``, ``indices``), in the order of a sequence.
-
-    ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia). ``regular`` is false where the last matrix was exactly
-    singular.
+    ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia); ``sizes`` returns the natural sizes of the unknowns,
+    None where they are one.  ``regular`` is false where the last matrix was exactly singular.  Other compiled code may
+    use the ``pointer``; whoever keeps it in a structure keeps this object, too.
     """
 
-    def __init__(
-        self,
-        kind: str,
-        starts: np.ndarray,
-        indices: np.ndarray,
-        order: tuple[np.ndarray, np.ndarray],
-    ) -> None:
+    def __init__(self, kind: str, border: int, sizes: Sizes | None = None) -> None:
         compiled = module("linalg/chain")
         self.lib, self.ffi = compiled.lib, compiled.ffi
-        self.rows, self.regular = len(starts) - 1, False
-        *pattern, groups = (np.ascontiguousarray(x, dtype=np.int32) for x in (starts, indices, *order))
-        made = self.lib.chain_new(
-            self.rows,
-            *(buffer(self.ffi, x) for x in pattern),
-            len(groups) - 1,
-            buffer(self.ffi, groups),
-            kind == "cholesky",
-            LARGEST,
-        )
-        if made == self.ffi.NULL:
-            raise MemoryError(f"No memory for the factors of {self.rows} unknowns.")
-        self._chain = self.ffi.gc(made, self.lib.chain_free)
+        self.kind, self.border, self.sizes, self.regular = kind, border, sizes, False
+        self._matrix: Shared | None = None
 
-    @property
-    def pointer(self) -> Any:
-        """The chain, for other compiled code; whoever keeps it in a structure keeps this object, too."""
-        return self._chain
+    def prepare(self, matrix: PETSc.Mat) -> Shared:
+        """Find the fronts of a ``matrix``, unless they are known; returns its values."""
+        own = shared(matrix)
+        assert own is not None
+        if own is not self._matrix:
+            pattern = own.pattern.indptr, own.pattern.indices
+            arrays = (*pattern, *sequence(*pattern, self.border))
+            *known, groups = (np.ascontiguousarray(x, dtype=np.int32) for x in arrays)
+            sizes = *(buffer(self.ffi, x) for x in known), len(groups) - 1, buffer(self.ffi, groups)
+            made = self.lib.chain_new(len(known[0]) - 1, *sizes, self.kind == "cholesky", LARGEST)
+            if made == self.ffi.NULL:
+                raise MemoryError(f"No memory for the factors of {len(known[0]) - 1} unknowns.")
+            self.pointer = self.ffi.gc(made, self.lib.chain_free)
+            if self.sizes is not None:  # the scale of the next matrix starts from them
+                self.lib.chain_sizes(self.pointer, buffer(self.ffi, np.array(self.sizes().array_r, dtype=float)))
+            self._matrix = own  # last: there may be no memory for the fronts
+        return own
 
     @property
     def functions(self) -> list[int]:
@@ -121,124 +111,35 @@ class Elimination:
         found = (self.ffi.addressof(self.lib, name) for name in ("chain_factor", "chain_solve"))
         return [int(self.ffi.cast("uintptr_t", address)) for address in found]
 
-    def factor(self, values: np.ndarray) -> None:
-        """Eliminate; raises :class:`GaveUpError` where the matrix is no chain."""
-        values = np.ascontiguousarray(values.real)
-        status = self.lib.chain_factor(self._chain, buffer(self.ffi, values))
+    def __call__(self, matrix: PETSc.Mat) -> None:
+        """Factor ``matrix``; raises :class:`ConvergenceError` for one that is no chain, or has no numbers in it."""
+        values = self.prepare(matrix).values
+        status = self.lib.chain_factor(self.pointer, buffer(self.ffi, values))
         self.regular = status == 0
-        if status == TOO_LARGE:
-            raise GaveUpError("The matrix could not be factored along the rod: its fronts are too large.")
         if status > SINGULAR:
-            raise ConvergenceError(
-                "The matrix could not be factored along the rod: it has entries that are no numbers."
-            )
+            why = "its fronts are too large" if status == TOO_LARGE else "it has entries that are no numbers"
+            raise ConvergenceError(f"The matrix could not be factored along the rod: {why}.")
 
-    def measure(self, sizes: np.ndarray) -> None:
-        """Let the scale of the next matrix start from the natural ``sizes`` (n,) of the unknowns."""
-        sizes = np.ascontiguousarray(sizes, dtype=float)
-        self.lib.chain_sizes(self._chain, buffer(self.ffi, sizes))
+    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Solve with the last factors."""
+        out.array[:] = self.solve_all(right.array_r[:, None])[:, 0]
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solutions (n, k) for ``right`` (n, k)."""
+    def solve_all(self, right: np.ndarray) -> np.ndarray:
+        """Solutions for all columns of ``right`` (n, k) at once."""
         right = np.asarray(right, dtype=float, order="F")
         out = np.empty_like(right)
-        if self.lib.chain_solve(self._chain, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
-            raise MemoryError(f"No memory for solutions of {self.rows} unknowns.")
+        if self.lib.chain_solve(self.pointer, right.shape[1], buffer(self.ffi, right), buffer(self.ffi, out)):
+            raise MemoryError(f"No memory for solutions of {len(right)} unknowns.")
         return out
 
     def inertia(self) -> tuple[int, int]:
         """Number of negative pivots of the symmetric matrix last factored, and of those that are zero."""
-        return int(self.lib.chain_negative(self._chain)), int(self.lib.chain_zero(self._chain))
-
-    @property
-    def growth(self) -> float:
-        """Largest multiplier of the last factors."""
-        return float(self.lib.chain_growth(self._chain))
-
-    @property
-    def delayed(self) -> int:
-        """Number of pivots that the last factors delayed, once for each front."""
-        return int(self.lib.chain_delayed(self._chain))
-
-    @property
-    def fronts(self) -> int:
-        """Number of fronts."""
-        return int(self.lib.chain_fronts(self._chain))
-
-
-class Chain:
-    """Factors of matrices with one pattern, on one rank, whose last ``border`` rows may couple to all others.
-
-    ``kind`` is ``lu``, or ``cholesky`` (LDL^t with the inertia); ``sizes`` returns the natural sizes of the unknowns,
-    None where they are one. ``regular`` is false where the last one was exactly singular; ``elimination`` has its
-    factors. A matrix on which the elimination gives up is factored by the last ``resort``, without one
-    :class:`GaveUpError` is raised; ``times`` is the number of those.
-    """
-
-    def __init__(self, kind: str, border: int, resort: Mumps | None = None, sizes: Sizes | None = None) -> None:
-        self.kind, self.border, self.resort, self.sizes = kind, border, resort, sizes
-        self.resorted, self.times, self.regular = False, 0, False
-        self._matrix: PETSc.Mat | None = None
-
-    def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``."""
-        self.resorted = False
-        self.prepare(matrix)
-        try:
-            self.elimination.factor(self._entries.values())
-            self.regular = self.elimination.regular
-        except GaveUpError:
-            if self.resort is None:
-                raise
-            self.resort(matrix)
-            self.resorted, self.regular = True, self.resort.regular
-            self.times += 1
-
-    def prepare(self, matrix: PETSc.Mat) -> None:
-        """Find the fronts of a ``matrix``, unless they are known."""
-        if self._matrix is None or matrix.handle != self._matrix.handle:
-            entries = Entries(matrix)
-            pattern = entries.starts, entries.columns
-            self.elimination = Elimination(self.kind, *pattern, sequence(*pattern, self.border))
-            if self.sizes is not None:
-                self.elimination.measure(self.sizes().array_r.real)
-            self._matrix, self._entries = matrix, entries  # last: there may be no memory for the fronts
-
-    def adopt(self, *, regular: bool) -> None:
-        """The factors are those that other compiled code has just made by :attr:`Elimination.functions`."""
-        self.resorted, self.regular, self.elimination.regular = False, regular, regular
-
-    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Solve with the last factors."""
-        if self.resort and self.resorted:
-            self.resort.solve(right, out)
-        else:
-            out.array[:] = self.elimination.solve(right.array_r.real[:, None])[:, 0]
-
-    def solve_all(self, right: np.ndarray) -> np.ndarray:
-        """Solutions for all columns of ``right`` (own rows, k) at once."""
-        return (self.resort.solve_all if self.resort and self.resorted else self.elimination.solve)(right)
-
-    def inertia(self) -> tuple[int, int]:
-        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
-        return (self.resort if self.resort and self.resorted else self.elimination).inertia()
-
-
-def package(prefix: str) -> str:
-    """Name of what factors a rod's matrices: PETSc's option with the prefix, or what is best."""
-    best = MUMPS if np.issubdtype(PETSc.ScalarType, np.complexfloating) else CHAIN
-    name = str(PETSc.Options(prefix).getString("pc_factor_mat_solver_type", best))
-    if name not in (CHAIN, MUMPS):
-        raise InputError(f"Nothing factors matrices by the name {name!r}: choose {CHAIN} or {MUMPS}.")
-    return name
+        return int(self.lib.chain_negative(self.pointer)), int(self.lib.chain_zero(self.pointer))
 
 
 def factors_of(kind: str, comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | None = None) -> Factors:
     """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
 
-    Those of another matrix, of 0 unknowns, and on several ranks are MUMPS's, which is the last resort of the others.
+    Those of another matrix, of 0 unknowns, and on several ranks are MUMPS's.
     """
-    mumps = Mumps(kind, sizes)
-    if not unknowns or package(mumps.prefix) == MUMPS or comm.size > 1:
-        return mumps
-    return Chain(kind, scalars, mumps, sizes)
+    return Chain(kind, scalars, sizes) if unknowns and comm.size == 1 else Mumps(kind, sizes)

@@ -21,13 +21,12 @@ import sys
 import sysconfig
 import tempfile
 from collections.abc import Hashable
-from functools import cache, partial
+from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rodfem import code_cache
-from rodfem.code_cache import Job
 from rodfem.errors import SetupError
 
 if TYPE_CHECKING:
@@ -41,8 +40,6 @@ PACKAGE = Path(__file__).parents[1]
 STRUCTURE = re.compile(r"^typedef struct[^{;]*(?:\{.*?^\})?[^;]*;", re.MULTILINE | re.DOTALL)
 FUNCTION = re.compile(r"^PUBLIC (.*?)\s*\{", re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"^#define \w+ \d+(?=\s)", re.MULTILINE)
-_JOBS: dict[str, Job] = {}
-"""What is compiled in the background, by name."""
 
 
 class Memory:
@@ -80,22 +77,11 @@ def buffer(ffi: Any, values: np.ndarray) -> Any:
     return ffi.from_buffer(kind, values if values.flags.c_contiguous else values.T)
 
 
-def compile_ahead(*names: str) -> None:
-    """Begin to compile in other processes what :func:`module` finds then in the cache, unless that has it."""
-    for name in names:
-        full = _full_name(name)
-        if full not in _JOBS and _library(name) is None:
-            _JOBS[full] = Job(partial(_compile, name))
-
-
 @cache
 def module(name: str) -> Any:
     """The compiled module of the file ``name.c`` in the package, with ``lib`` and ``ffi`` of cffi."""
-    full = _full_name(name)
-    if full in _JOBS:
-        _JOBS.pop(full).wait()
     found = _library(name) or _compile(name)
-    spec = importlib.util.spec_from_file_location(full, found)
+    spec = importlib.util.spec_from_file_location(_full_name(name), found)
     assert spec is not None and spec.loader is not None
     out = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(out)

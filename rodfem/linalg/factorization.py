@@ -1,8 +1,7 @@
 """Factors of matrices with a fixed pattern: what all of them have in common, and those of MUMPS.
 
-MUMPS serves rods on several ranks, and is the reference and the last resort on one: what is factored along the rod
-(:mod:`rodfem.linalg.chain`) may be factored by it as well (``-rodfem_lu_pc_factor_mat_solver_type mumps``,
-``-rodfem_cholesky_...``), with the same numbers.
+MUMPS serves rods on several ranks, and is the reference on one: what is factored along the rod
+(:mod:`rodfem.linalg.chain`) may be factored by it as well (``Discretization(factors="petsc")``), with the same numbers.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
-"""Conversion of matrices of a rank's own unknowns to PETSc and back, the entries that PETSc stores, and shared ones."""
+"""Conversion of matrices of a rank's own unknowns to PETSc and back, and matrices whose values numpy shares."""
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -97,32 +96,3 @@ def places_in(pattern: sp.csr_matrix, other: sp.csr_matrix) -> np.ndarray:
         for x in (pattern, other)
     ]
     return np.searchsorted(*numbers).astype(np.int32)
-
-
-@cache
-def _petsc() -> ctypes.CDLL:
-    """PETSc's library, which petsc4py has loaded, for functions that petsc4py does not have."""
-    return ctypes.CDLL(PETSc.__file__)
-
-
-class Entries:
-    """Entries of an AIJ matrix on one rank whose pattern (``starts``, sorted ``columns``) stays."""
-
-    def __init__(self, matrix: PETSc.Mat) -> None:
-        self.matrix, self.known = matrix, shared(matrix)
-        if self.known is not None:
-            self.starts, self.columns = self.known.pattern.indptr, self.known.pattern.indices
-        else:
-            self.starts, self.columns, _ = matrix.getValuesCSR()
-
-    def values(self) -> np.ndarray:
-        """Values now, in the array of PETSc: not to be kept."""
-        if self.known is not None:
-            return self.known.values
-        if not (number := len(self.columns)):
-            return np.empty(0, PETSc.ScalarType)
-        matrix, at = ctypes.c_void_p(self.matrix.handle), ctypes.c_void_p()
-        _petsc().MatSeqAIJGetArrayRead(matrix, ctypes.byref(at))
-        stored = (ctypes.c_byte * (number * np.dtype(PETSc.ScalarType).itemsize)).from_address(at.value or 0)
-        _petsc().MatSeqAIJRestoreArrayRead(matrix, ctypes.byref(at))
-        return np.frombuffer(memoryview(stored), PETSc.ScalarType)

@@ -271,11 +271,9 @@ def place(q: Any, R: Any, s: Any, r: Any = None, **more: Any) -> Place:
     return CheckedPlace(q=q, R=R, s=s, **d, **({} if r is None else {"r": r}), **more)
 
 
-def some_places(
-    scene: Scene, state: int = 0, wrap: Callable[[Any], Any] | None = None, s: float | None = None
-) -> tuple[Place, Place]:
-    """A point and a place along the rod in a ``state`` of :data:`STATES`, by default at an ``s`` inside the rod."""
-    given = scene.length, inside(scene.interval)[0] if s is None else s, STATES[state]
+def some_places(scene: Scene, wrap: Callable[[Any], Any] | None = None, s: float | None = None) -> tuple[Place, Place]:
+    """A point and a place along the rod in the first of :data:`STATES`, by default at an ``s`` inside the rod."""
+    given = scene.length, inside(scene.interval)[0] if s is None else s, STATES[0]
     return numbers_at(*given) if wrap is None else places_at(*given, wrap)
 
 

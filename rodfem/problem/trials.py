@@ -11,7 +11,6 @@ have one value at two states that are each other's image by the plane.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Sized
-from contextlib import contextmanager
 from dataclasses import dataclass
 from math import inf, isfinite, isnan, nan
 from numbers import Real
@@ -21,7 +20,7 @@ import numpy as np
 import ufl
 
 from rodfem.errors import SceneError
-from rodfem.expressions import EQ, NE, ComplexValue, ScalarValue, Variable, differentiated, evaluated, parts
+from rodfem.expressions import Variable, differentiated, evaluated
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.arguments import check_scalar, check_vector, number_of, plain, takes
 from rodfem.problem.functions import (
@@ -31,7 +30,6 @@ from rodfem.problem.functions import (
     Constants,
     Place,
     Role,
-    UnnamedError,
     derived,
     functions_of,
     inside,
@@ -73,21 +71,6 @@ class Symbol(Variable):  # type: ignore[misc]
         return self.name
 
 
-@contextmanager
-def _no_truth() -> Iterator[None]:
-    """Have ``ufl.eq`` refused for true or false, which UFL answers by how its sides are written."""
-
-    def refuse(condition: Any) -> bool:
-        raise UnnamedError("takes ufl.eq or ufl.ne for true or false: write ufl.conditional(ufl.eq(a, b), ..., ...).")
-
-    usual = EQ.__bool__, NE.__bool__
-    EQ.__bool__ = NE.__bool__ = refuse
-    try:
-        yield
-    finally:
-        EQ.__bool__, NE.__bool__ = usual
-
-
 def symbols(scene: Scene, names: Container[str] | None = None) -> Constants:
     """Constants as a function of them meets them in the equations: those with the ``names`` (all) as expressions."""
     values = vars(scene.constants()).items()
@@ -115,7 +98,7 @@ def check_functions(scene: Scene) -> None:
 def expressions_of(scene: Scene) -> Iterator[Any]:
     """What functions of a scene return for symbols of its constants."""
     for trial in sorted(_trials(scene), key=lambda trial: trial.of_place):
-        yield from (e for e in trial.expressions(0)[1] if e is not None)
+        yield from (e for e in trial.expressions[1] if e is not None)
 
 
 def _trials(scene: Scene) -> Iterator[_Trial]:
@@ -149,53 +132,47 @@ class _Trial:
 
     def compare(self) -> None:
         """Raise :class:`SceneError` for a value of the expression that is not the one of the function of numbers."""
-        values, scene = list(self._pairs()), self.scene
-        size = max((abs(x) for _, x, _ in values if isfinite(x)), default=0.0)
-        for symbolic, number, there in values:
+        load, found = self.scene.load, list(self._found())
+        size = max((abs(x) for _, x, _ in found if isfinite(x)), default=0.0)
+        for symbolic, number, there in found:
             least = SAME * max(abs(number), min(abs(symbolic), size)) + NEGLIGIBLE * size
             if isnan(symbolic) or not isfinite(number) or abs(symbolic - number) <= least:
                 continue
-            name = next((x for x in scene.parameters if x != scene.load), scene.load)
+            name = next((x for x in self.scene.parameters if x != load), load)
             raise SceneError(
                 f"The {self.what} is {number:.10g} as a function of numbers and {symbolic:.10g} as an expression of "
-                f"its constants, at {scene.load} = {vars(there)[scene.load]:g}: do not compare constants by ==, in or "
-                f"if, nor use them as keys; write ufl.conditional(ufl.eq(c.{name}, 1), ..., ...)."
+                f"its constants, at {load} = {vars(there)[load]:g}: do not compare constants by ==, in or if, nor use "
+                f"them as keys; write ufl.conditional(ufl.eq(c.{name}, 1), ..., ...)."
             )
 
-    def _pairs(self) -> Iterator[tuple[float, float, Constants]]:
+    def _found(self) -> Iterator[tuple[float, float, Constants]]:
         """Values of expression and function, nan if UFL has none, inf if undefined, and the constants there."""
-        for state in range(len(STATES) if self.of_place else 1):
-            if self.of_place:
-                self.expressions(state)  # what it raises is no matter of the state
-            for there in self._constants(state):
-                try:
-                    numbers = self._called(there, state)
-                except SceneError:
-                    if self.of_place:  # it may be undefined: the rod need not take the state
-                        continue
-                    raise
-                self._check(numbers)
-                c, expressions = self.expressions(state)
-                for name, symbol in vars(c).items():
-                    if isinstance(symbol, Symbol):
-                        symbol.value = vars(there)[name]
-                yield from ((*_pair(e, x), there) for e, x in zip(expressions, numbers, strict=True))
+        for there in self._constants():
+            try:
+                numbers = self._called(there)
+            except SceneError:
+                if self.of_place:  # it may be undefined: the rod need not take the state
+                    continue
+                raise
+            self._check(numbers)
+            c, expressions = self.expressions
+            for name, symbol in vars(c).items():
+                if isinstance(symbol, Symbol):
+                    symbol.value = vars(there)[name]
+            yield from ((*_pair(e, x), there) for e, x in zip(expressions, numbers, strict=True))
 
-    def _constants(self, state: int) -> Iterator[Constants]:
+    def _constants(self) -> Iterator[Constants]:
         """Constants at which the function is tried."""
         scene = self.scene
         s = inside(scene.interval)[0] if self.s is None and self.of_place else self.s
-        yield scene.constants(s=s)
-        if state == 0:
-            yield from (scene.constants(load, s) for load in scene.loads())
+        yield from (scene.constants(load, s) for load in (None, *scene.loads()))
         if self.role.along and not self.of_place:
             yield from (scene.constants(s=place) for place in scene.samples())
 
-    def _called(self, c: Constants, state: int, wrap: Callable[[Any], Any] | None = None) -> list[Any]:
-        """Components of what the function returns for constants and a state, whose vectors pass through ``wrap``."""
+    def _called(self, c: Constants, wrap: Callable[[Any], Any] | None = None) -> list[Any]:
+        """Components of what the function returns for constants, and a state whose vectors pass through ``wrap``."""
         if self.of_place:
-            places = some_places(self.scene, state, wrap, c.s)
-            return [of_state(self.function, self.role, places, c)]
+            return [of_state(self.function, self.role, some_places(self.scene, wrap, c.s), c)]
         values = self.function(c)
         if self.role.size:
             check_vector(self.what, values, self.role.size)
@@ -212,12 +189,13 @@ class _Trial:
             if not self.of_place and not isfinite(number_of(value)):
                 raise SceneError(f"The {what} is {value}: return a finite real number.")
 
-    def expressions(self, state: int) -> tuple[Constants, list[Any]]:
+    @property
+    def expressions(self) -> tuple[Constants, list[Any]]:
         """Constants as the equations have them, and what the function makes of them; derived once."""
-        key = (self.role, self.s, state, self.scene.length, *self.scene.parameters)
-        return derived(self.function, key, lambda: self._symbolic(state))
+        key = (self.role, self.s, self.scene.length, *self.scene.parameters)
+        return derived(self.function, key, self._symbolic)
 
-    def _symbolic(self, state: int) -> tuple[Constants, list[Any]]:
+    def _symbolic(self) -> tuple[Constants, list[Any]]:
         c = symbols(self.scene, None if self.s is None else self.scene.parameters)
         if self.s is not None:
             c.s = self.s
@@ -227,18 +205,10 @@ class _Trial:
             name, size = next(names), vector.ufl_shape[0]
             return ufl.as_vector([Symbol.named(f"{name}[{i}]", float(vector[i])) for i in range(size)])
 
-        with _no_truth():
-            found = self._called(c, state, symbolic)
+        found = self._called(c, symbolic)
         if self.of_place:
             self._check(found)
-        return c, [e if e is None else self._expression(e) for e in found]
-
-    def _expression(self, value: Any) -> Any:
-        """Expression of a value without derivatives that are left to take, of finite real numbers."""
-        for part in parts(value):
-            if isinstance(part, ComplexValue) or (isinstance(part, ScalarValue) and not isfinite(part)):
-                raise SceneError(f"The {self.what} has {part} in it: return an expression of finite real numbers.")
-        return differentiated(ufl.as_ufl(value))
+        return c, [e if e is None else differentiated(ufl.as_ufl(e)) for e in found]
 
 
 def of_state(function: Callable[..., Any], role: Role, places: tuple[Place, Place], c: Constants) -> Any:

@@ -10,12 +10,11 @@ import pytest
 from golden_cases import cases, distinct
 from mpi4py import MPI
 from petsc4py import PETSc
-from random_chains import petsc, random_chain
+from random_chains import matrix_of, random_chain
 from small_states import scene as small_scene
 
 import rodfem.linalg
-import rodfem.linalg.chain
-from rodfem import ConvergenceError, Discretization, InputError, Plan, Solver, trace
+from rodfem import ConvergenceError, Discretization, Plan, Solver, trace
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Mumps
@@ -37,13 +36,14 @@ def test_random_chains(symmetric: bool) -> None:
             continue
         tried += 1
         factors = Chain("cholesky" if symmetric else "lu", border)
-        factors(petsc(dense, coupled))
+        factors(matrix_of(dense, coupled))
         right = rng.normal(size=(len(dense), int(rng.integers(1, 7))))
-        found = factors.elimination.solve(right)
+        found = factors.solve_all(right)
         size = abs(dense).sum(axis=1).max() * abs(found).max()
         assert factors.regular and abs(dense @ found - right).max() < 100 * BACKWARD * size
-        assert factors.elimination.growth <= 100.0 or factors.elimination.fronts == 1
-        delayed += factors.elimination.delayed
+        growth, fronts = (of(factors.pointer) for of in (factors.lib.chain_growth, factors.lib.chain_fronts))
+        assert growth <= 100.0 or fronts == 1
+        delayed += factors.lib.chain_delayed(factors.pointer)
         if symmetric:
             assert factors.inertia() == ((np.linalg.eigvalsh(dense) < 0).sum(), 0)
     assert delayed > 100
@@ -53,22 +53,12 @@ def test_what_cannot_be_factored() -> None:
     """Exactly singular, no number; and a pattern is learnt anew for another matrix."""
     dense = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     factors = Chain("cholesky", 0)
-    factors(petsc(dense, dense != 0))
+    factors(matrix_of(dense, dense != 0))
     assert not factors.regular and factors.inertia()[1] == 1
     with pytest.raises(ConvergenceError, match="no numbers"):
-        factors(petsc(np.diag([1.0, np.nan]), np.eye(2, dtype=bool)))
-    factors(petsc(np.diag([1.0, -2.0]), np.eye(2, dtype=bool)))
+        factors(matrix_of(np.diag([1.0, np.nan]), np.eye(2, dtype=bool)))
+    factors(matrix_of(np.diag([1.0, -2.0]), np.eye(2, dtype=bool)))
     assert factors.regular and factors.inertia() == (1, 0)
-
-
-def test_an_unknown_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    options = PETSc.Options()
-    options["rodfem_lu_pc_factor_mat_solver_type"] = "superglue"
-    try:
-        with pytest.raises(InputError, match="'superglue': choose chain or mumps"):
-            Solver(small_scene("cord"), Discretization("reduced", 4, 3))
-    finally:
-        del options["rodfem_lu_pc_factor_mat_solver_type"]
 
 
 class Both:
@@ -143,8 +133,8 @@ def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) ->
     found.count()
     factors = found.factors
     assert isinstance(factors, Chain)
-    assert factors.elimination.fronts >= elements - 1
-    assert factors.elimination.delayed < elements / 4
+    assert factors.lib.chain_fronts(factors.pointer) >= elements - 1
+    assert factors.lib.chain_delayed(factors.pointer) < elements / 4
 
 
 @pytest.mark.long
@@ -171,19 +161,3 @@ def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
     assert built.returncode == 0, built.stderr
     done = run([str(program)])
     assert (done.returncode, done.stdout) == (0, "0 wrong\n"), done.stdout + done.stderr
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("scene", ["cord", "hemitropic"])
-def test_the_last_resort(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without any room for delayed pivots MUMPS makes factors, the diagram is the same, and it says so."""
-    mesh, plan = Discretization("pointwise", 6, 3), Plan(depth=0, error_bars=False)
-    expected = trace(small_scene(scene), mesh, plan)
-    monkeypatch.setattr(rodfem.linalg.chain, "LARGEST", 0)
-    found = trace(small_scene(scene), mesh, plan)
-    assert any("MUMPS factored them" in warning for warning in found.warnings)
-    for ours, theirs in zip(found.branches, expected.branches, strict=True):
-        assert [s.kind for s in ours.special] == [s.kind for s in theirs.special]
-        assert [p.negative for p in ours.points] == [p.negative for p in theirs.points]
-        np.testing.assert_allclose([p.load for p in ours.points], [p.load for p in theirs.points], rtol=1e-9)
-    assert not any("MUMPS" in warning for warning in expected.warnings)
