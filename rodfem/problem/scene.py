@@ -345,7 +345,7 @@ class Scene(Contribution, metaclass=Stated):
         a, b = self.interval
         if not (isfinite(a) and isfinite(b) and a < b):
             raise SceneError(f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends, the left one first.")
-        if b - a < 1e-9 * max(abs(a), abs(b)):
+        if b - a < 1e-9 * max(abs(a), abs(b)):  # round-off of arclengths is seen then
             what = f"A rod from {a:g} to {b:g} is short for its arclengths' round-off"
             raise SceneError(f"{what}: let the arclength begin at zero.")
         if not isinstance(self.rod, str) or self.rod not in RODS:
