@@ -1,8 +1,8 @@
 """Ranks of one job: what they do together, how they fail, and how they end, with each other and with mpirun.
 
 A fault of a numerical library that all ranks have is a failure, as that of an iteration which does not converge; one
-that a rank has alone ends all of them.  An interrupt of a program is one sentence and status 130, whichever rank gets
-it.
+that a rank has alone ends all of them.  An interrupt of a program is one sentence of its first rank, and
+status 130.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, NoReturn
 
@@ -143,10 +142,10 @@ def listen() -> None:
 
 
 def leave(sentence: str) -> NoReturn:
-    """Print a sentence, once, and leave with status 130; other ranks, which may know of nothing, end, too."""
+    """Print a sentence on the first rank, and leave with status 130; other ranks, which may know of nothing, end."""
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)  # once is enough
-    if _is_first("interrupted"):
+    if not launched() or "0" in map(os.environ.get, RANK):
         sys.stderr.write(f"\n{sentence}\n")
         sys.stderr.flush()
     if launched():
@@ -161,19 +160,6 @@ def leave(sentence: str) -> NoReturn:
 def end_quietly() -> None:
     """Have the system end this process if nobody reads what it prints, as ``head``; PETSc has no handler of its own."""
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-
-
-def _is_first(word: str) -> bool:
-    """Whether no other rank of this job, on this machine, has asked so for ``word``; yes where that is unknown."""
-    if not launched():  # a variable may be left from the job of a parent
-        return True
-    try:  # in the folder that all ranks of a job on one machine share, and that goes with the job
-        os.close(os.open(Path(os.environ["PMIX_SERVER_TMPDIR"]) / f"rodfem-{word}", os.O_CREAT | os.O_EXCL))
-    except FileExistsError:
-        return False
-    except (KeyError, OSError):
-        pass
-    return True
 
 
 @cache

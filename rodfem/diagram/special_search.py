@@ -122,7 +122,9 @@ class SpecialSearch:
             self._open = [interpolated(settled, self.meshes.solvers[b.mesh])]
         try:
             self._open.append(b)
-            return self._points() if self._regular(b) or len(self._open) > PATIENCE else []
+            self._prepare(self._open[0])
+            regular = self._reduced(b).zero <= min(self._reduced(p).zero for p in self._open)  # to working accuracy
+            return self._points() if regular or len(self._open) > PATIENCE else []
         except Unresolved:
             self._open = [settled]
             raise
@@ -134,11 +136,6 @@ class SpecialSearch:
     def overshoot(self, a: Point, b: Point) -> list[SpecialPoint]:
         """Special points between a row and a point past the end of its branch."""
         return self._search(a, b, ended=True)
-
-    def _regular(self, point: Point) -> bool:
-        """Whether no more eigenvalues are zero than all along, to working accuracy."""
-        self._prepare(self._open[0])
-        return self._reduced(point).zero <= min(self._reduced(p).zero for p in self._open)
 
     def _points(self, *, ended: bool = False) -> list[SpecialPoint]:
         a, b = self._open[0], self._open[-1]

@@ -162,7 +162,9 @@ class Tracer:
             return False
         except Ended as end:
             branch.ended = str(end)
-            self._say_early(branch)
+            for remedy in (remedy for reason, remedy in REMEDIES.items() if reason in branch.ended):
+                words = f"{branch.name} ends: {branch.ended}; {remedy}."
+                self.observer.warn(Remark(words, branch.points[-1].load))
         return True
 
     def _say_unstable(self, branch: Branch) -> None:
@@ -172,13 +174,6 @@ class Tracer:
             index = index_range(point.negative, point.zero - self.solver.system.active_drifts(point.x))
             words = f"  the first state is unstable already (index {index}): stability was lost outside the range"
             self.observer.note(Remark(words, point.load))
-
-    def _say_early(self, branch: Branch) -> None:
-        """Warn of a branch that ends for a reason that has a remedy."""
-        for reason, remedy in REMEDIES.items():
-            if reason in branch.ended:
-                words = f"{branch.name} ends: {branch.ended}; {remedy}."
-                self.observer.warn(Remark(words, branch.points[-1].load))
 
     def _take(self, branch: Branch, history: list[Point], row: Point) -> None:
         """Append a row to a branch, with the special points before it."""

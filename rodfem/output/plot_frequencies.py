@@ -1,8 +1,4 @@
-"""Frequencies against the load, drawn from ``diagram.json`` alone: curves of roots, and ranges that are unstable.
-
-Next to a flutter load ``P_f`` eigenvalues are ``mu = mu_f + c sqrt(P - P_f) + ...``.  Curves have points of this law
-between the rows there, where a chord would show a corner.
-"""
+"""Frequencies against the load, drawn from ``diagram.json`` alone: curves of roots, and ranges that are unstable."""
 
 from __future__ import annotations
 
@@ -37,10 +33,7 @@ COLORS = {"bending about d1": 1, "bending about d2": 2, "torsion": 3, "bending":
 RANGES = ("#E9E4F3", "#FBE6D9", "#F3D3C6")
 """Shades of ranges of divergence, of flutter, and of both."""
 REAL = 1e-6  # an imaginary part smaller than this, relative to the root, is round-off
-LEAST = 1e-3
-"""Least frequency at the top of a picture; distance of eigenvalues that have met from their mean, relative to it."""
-SHARES = np.array([0.001, *np.linspace(0.125, 0.875, 7)]) ** 2
-"""Where the step next to a flutter load has points, in parts of it from there: at the first one the pair has parted."""
+LEAST = 1e-3  # least frequency at the top of a picture
 PARTS = {
     "complex pair, real part": ("x", "-"),
     "complex pair, imaginary part": ("+", "--"),
@@ -82,7 +75,7 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]]) -> list[Artist]
         for found in ranges_of(branch):
             axes.axvspan(found.low, found.high, color=found.shade, zorder=0, lw=0)
             ranges[found.words] = Patch(color=found.shade, label=found.words)
-        for curve in curves_of(branch):
+        for curve in curves(branch):
             shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
         shown |= _marked(axes, branch["special"])
     looks: dict[str, dict[str, Any]] = {
@@ -167,48 +160,20 @@ def root(mu: Any, rates: bool) -> Any:
     return np.where(mu.imag < 0.0, complex(np.nan, np.nan), mu.imag + 1j * np.maximum(-mu.real, 0.0))
 
 
-def curves(
-    columns: Mapping[str, Any], special: Sequence[Mapping[str, Any]] = (), *, rates: bool = False
-) -> list[FrequencyCurve]:
-    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve.
-
-    By its ``columns``, and ``special`` points that have square roots there.
-    """
+def curves(branch: Mapping[str, Any]) -> list[FrequencyCurve]:
+    """All curves of frequencies of a branch, those of one motion together; its most frequent one names a curve."""
     found: dict[int, list[Member]] = {}
-    rows = zip(*(columns[name] for name in ("load", "omega2", "motion", "curve")), strict=True)
+    rows = zip(*(branch["columns"][name] for name in ("load", "omega2", "motion", "curve")), strict=True)
     for row, (load, *modes) in enumerate(rows):
         for pair, motion, number in zip(*modes, strict=True):
             mu = 0j if motion == RIGID else complex(*pair)  # what the file has is round-off
             found.setdefault(number, []).append((load, row, mu, motion))
-    met = {p["row"]: float(p["omega2"]) for p in special if p["kind"] == FLUTTER and p.get("omega2") is not None}
     out = []
-    for each in found.values():
-        loads, places, values, motions = zip(*sorted(_with_roots(each, met), key=lambda x: x[0]), strict=True)
-        roots = root(np.array(values, dtype=np.complex128), rates)
+    for members in found.values():
+        loads, places, values, motions = zip(*sorted(members, key=lambda x: x[0]), strict=True)
+        roots = root(np.array(values, dtype=np.complex128), bool(branch.get("rates")))
         out.append(FrequencyCurve(Counter(motions).most_common(1)[0][0], np.array(loads), np.array(places), roots))
     return sorted(out, key=lambda curve: (curve.motion, np.nan_to_num(abs(curve.roots[0]))))
-
-
-def curves_of(branch: Mapping[str, Any]) -> list[FrequencyCurve]:
-    """The same of all that a branch has; rates are smooth at its special points."""
-    rates = bool(branch.get("rates"))
-    return curves(branch["columns"], () if rates else branch["special"], rates=rates)
-
-
-def _with_roots(members: Sequence[Member], met: Mapping[int, float]) -> list[Member]:
-    """Points of a curve, and those of a square root next to the rows of ``met``, each with its double eigenvalue."""
-    out = list(members)
-    for i, (load, row, mu, motion) in enumerate(members):
-        mean = met.get(row, np.inf)
-        if abs(mu - mean) <= LEAST * abs(mean) < np.inf:
-            out[i] = (load, row, complex(mean), motion)
-            sides = [*members[max(i - 1, 0) : i], *members[i + 1 : i + 2]]
-            for other, near, value, _ in (side for side in sides if side[1] not in met):
-                drift = (value - mean).real if value.imag else 0.0  # of the mean of a complex pair
-                values = mean + SHARES * drift + SHARES**0.5 * (value - mean - drift)
-                places = load + SHARES * (other - load), np.where(SHARES > 0.5, near, row), values
-                out += [(*place, motion) for place in zip(*places, strict=True)]
-    return out
 
 
 def ranges_of(branch: Mapping[str, Any]) -> Iterator[Range]:

@@ -22,7 +22,7 @@ from rodfem.file_format import LOCUS, read_json
 from rodfem.modes.modes import RIGID
 from rodfem.output.pieces import endings, pieces_of
 from rodfem.output.plot_diagram import dense_rows
-from rodfem.output.plot_frequencies import SPECIAL, curves_of, ranges_of, top
+from rodfem.output.plot_frequencies import SPECIAL, curves, ranges_of, top
 from rodfem.output.plot_locus import LINES, in_words, plane_of, stable_region
 from rodfem.output.table import plain
 from rodfem.output.words import number, readings_of, with_unit, words_of
@@ -157,7 +157,7 @@ def _frequencies(branch: Data) -> dict[str, Any]:
                 "rows": curve.rows.tolist(),
                 "parts": {"frequency": plain(curve.real)} | {name: plain(part) for name, part in curve.parts.items()},
             }
-            for curve in curves_of(branch)
+            for curve in curves(branch)
         ],
         "ranges": [found._asdict() for found in ranges_of(branch)],
         "marks": [

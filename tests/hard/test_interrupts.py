@@ -65,8 +65,7 @@ def test_one_process(folder: Path, number: int) -> None:
 @pytest.mark.parametrize(
     ("whom", "number", "status"),
     [
-        ("last", signal.SIGINT, 130),
-        pytest.param("all", signal.SIGINT, 130, marks=pytest.mark.long),
+        ("all", signal.SIGINT, 130),
         ("mpirun", signal.SIGINT, 1),  # its own status
         ("mpirun", signal.SIGKILL, -signal.SIGKILL),
     ],
@@ -81,7 +80,7 @@ def test_two_ranks(folder: Path, whom: str, number: int, status: int) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("ranks", "whom"), [pytest.param(1, "first", marks=pytest.mark.long), (2, "last")])
+@pytest.mark.parametrize(("ranks", "whom"), [(1, "first"), (2, "all")])
 def test_many_rods(folder: Path, ranks: int, whom: str) -> None:
     ended = struck((*MAP, str(folder)), ranks, ROD, whom, signal.SIGINT)
     assert (ended.left, ended.status, ended.errors.count(KEPT)) == ([], 130, 1)

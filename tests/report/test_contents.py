@@ -91,7 +91,7 @@ def test_rigid_motions_have_no_frequency() -> None:
     omega2 = [[[-4e-11, 0.0], [25.0, 0.0]], [[3e-11, 0.0], [36.0, 0.0]]]
     columns = {"load": [0.0, 1.0], "omega2": omega2, "motion": [[RIGID, "bending"]] * 2, "curve": [[0, 1]] * 2}
     assert _without_noise(columns) == [[[0.0, 0.0], [25.0, 0.0]], [[0.0, 0.0], [36.0, 0.0]]]
-    bending, rigid = curves(columns)
+    bending, rigid = curves({"columns": columns})
     assert rigid.motion == RIGID and rigid.real.tolist() == [0.0, 0.0] and bending.real.tolist() == [5.0, 6.0]
     assert all(np.isnan(part).all() for curve in (bending, rigid) for part in curve.parts.values())
 
