@@ -67,10 +67,10 @@ class Format:
     def _check(self, mark: Mapping[str, Any], entries: Any, where: Path | str, needs: Sequence[str]) -> None:
         if mark.get("name") != self.name:
             raise InputError(f"{where} is no {self.name}, its format is {mark.get('name')!r}: give {self.file}.")
-        if mark["version"] != self.version:
+        if mark["version"] > self.version:
             raise InputError(
                 f"{where} was written by {mark['program']}, in version {mark['version']} of the format {self.name!r}, "
-                f"and {PROGRAM} reads version {self.version}: read it with that program, or run the scene again."
+                f"and {PROGRAM} reads versions up to {self.version}: read it with that program, or run the scene again."
             )
         if missing := [name for name in needs if name not in entries]:
             raise InputError(f"{where} has no {', '.join(missing)}, so it is no {self.name}: give {self.file}.")

@@ -79,7 +79,8 @@ def _check(data: dict[str, Any], scene: Scene, folder: Path) -> None:
 
 def _check_equations(data: dict[str, Any], system: System, folder: Path) -> None:
     """Raise :class:`InputError` where the equations of a ``system`` are not those that the files of the run tell."""
-    if not same(data["asked"][EQUATIONS], fingerprint(system, tuple(data["range"]))):
+    version = data["format"]["version"]
+    if not same(data["asked"][EQUATIONS], fingerprint(system, tuple(data["range"]), version)):
         raise InputError(
             f"{folder} was run with other equations than those of the scene {system.scene.name!r} (at one and the "
             "same state their residual, ordinate, or stored, potential or kinetic energy differ): give the scene that "

@@ -19,31 +19,32 @@ SAME = 1e-9
 """Relative difference of fingerprints that is round-off."""
 
 
-def fingerprint(system: System, span: tuple[float, float]) -> list[float | None]:
+def fingerprint(system: System, span: tuple[float, float], version: int = 2) -> list[float | None]:
     """Numbers of the equations of a ``system`` at a smooth state, at loads of the range of its scene and of a ``span``.
 
-    First the norm of the residual, stored energy and ordinate at both ends of the range of the scene; then kinetic
-    energy and total potential energy there; then all five at loads inside, and at those of the ``span`` if that is
-    another range.  What is not finite, or is not there, is None.  Collective.
+    First the norm of the residual, stored energy and ordinate at both ends of the range of the scene, which older files
+    have alone; then kinetic energy and total potential energy there; then all five at loads inside, and at those of the
+    ``span`` if that is another range.  What is not finite, or is not there, is None.  ``version`` is that of
+    the file.  Collective.
     """
     system.set_phase(None)
-    shape, mass = Shape(system), system.metric_matrix()
-    found = [_numbers(shape, mass, load) for load in _loads(system, span)]
+    shape, mass, units = Shape(system), system.metric_matrix(), _units(system, version)
+    found = [_numbers(shape, mass, load, units) for load in _loads(system, span)]
     ends, others = found[:2], found[2:]
     out = [values[:3] for values in ends] + [values[3:] for values in ends] + others
     return [float(value) if np.isfinite(value) else None for values in out for value in values]
 
 
 def same(a: list[float | None], b: list[float | None]) -> bool:
-    """Whether two fingerprints are those of one scene."""
+    """Whether two fingerprints are those of one scene; of an older file, which has less, what it has is compared."""
     pairs = list(zip(a, b, strict=False))
-    if len(a) != len(b) or any((p is None) != (q is None) for p, q in pairs):
+    if any((p is None) != (q is None) for p, q in pairs):
         return False
     known = np.array([(p, q) for p, q in pairs if p is not None and q is not None]).reshape(-1, 2)
     return bool((abs(known[:, 0] - known[:, 1]) <= SAME * abs(known).max(axis=1)).all())
 
 
-def _numbers(shape: Shape, mass: PETSc.Mat, load: float) -> list[float]:
+def _numbers(shape: Shape, mass: PETSc.Mat, load: float, units: PETSc.Vec) -> list[float]:
     """Residual's norm, stored energy, ordinate, kinetic energy and potential at a load; nan where there is none.
 
     What a drag dissipates, in the place of a kinetic energy, is negative.  The kinetic metric of the system is written
@@ -51,8 +52,10 @@ def _numbers(shape: Shape, mass: PETSc.Mat, load: float) -> list[float]:
     """
     system = shape.system
     x, change = _waves(system, load), system.vector(system.fields.sizes * system.fields.wave())
+    x.pointwiseMult(x, units)
     state, residual = system.at(x), system.new_vector()
     state.residual(residual)
+    residual.pointwiseMult(residual, units)
     mass.zeroEntries()
     if not system.equations.massless:  # dolfinx has no form of nothing
         state.assemble_into(mass, system.equations.kinetic)
@@ -60,6 +63,13 @@ def _numbers(shape: Shape, mass: PETSc.Mat, load: float) -> list[float]:
     kinetic = (mass * change).dot(change).real / (2 if system.scene.inertia.order == 2 else -2)
     energy = state.integral(system.equations.potential) if system.equations.potential is not None else float("nan")
     return [residual.norm(), state.energy(), shape.ordinate(x), kinetic, energy]
+
+
+def _units(system: System, version: int) -> PETSc.Vec:
+    """Of each unknown that of a version of the files in today's: moments at ends were twice what they are."""
+    ends = [x.name for x in system.fields.unknown_scalars if x.group.moment and x.direction]
+    halves = system.fields.filled({name: 0.5 for name in ends if version == 1})
+    return system.vector(np.where(halves == 0.0, 1.0, halves))
 
 
 def _loads(system: System, span: tuple[float, float]) -> list[float]:

@@ -216,6 +216,15 @@ def _sample(path: Path, branch: str, row: int, formulation: str) -> dict[str, An
     unfit = f"{path} has no row {row} of a branch {branch!r}: see the names and lengths in diagram.json next to it."
     with STATES.opened(path, ("formulation", "branches"), unfit) as file:
         found, group = file.attrs["formulation"], file[f"branches/{branch}"]
+        first = file.attrs.get("format_version", 1) == 1
         if found != formulation:
             raise InputError(f"{path} holds states of the {found} formulation: choose that, not {formulation}.")
-        return {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
+        sample = {name: _trimmed(value[row]) for name, value in group.items() if isinstance(value, h5py.Dataset)}
+        return dict(_of_first(name, value) for name, value in sample.items()) if first else sample
+
+
+def _of_first(name: str, value: Any) -> tuple[str, Any]:
+    """Entry of a state of version 1, which has ``p0`` for ``p1``, and twice the moments at the ends."""
+    if name[0] == "p" and name[1:].isdigit():
+        return f"p{int(name[1:]) + 1}", value
+    return name, value / 2 if name[:2] in ("ma", "mb") and name[2:].isdigit() else value

@@ -353,7 +353,9 @@ def test_files_say_what_they_are(copied: Path) -> None:
 def test_files_of_a_newer_version_are_refused(copied: Path) -> None:
     for form in FORMATS:
         marked(copied / NAMES[form], form.version + 1)
-    sentence = rf"was written by rodfem 9\.1, in version [23] of the format 'rodfem \w+', and {PROGRAM} reads version"
+    sentence = (
+        rf"was written by rodfem 9\.1, in version [23] of the format 'rodfem \w+', and {PROGRAM} reads versions up to"
+    )
     for reader in read(copied):
         with pytest.raises(InputError, match=sentence):
             reader()
