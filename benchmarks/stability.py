@@ -49,13 +49,14 @@ METHODS = (
     "count",
     "eigenvalues",
     "shift-invert",
+    "slicing",
     "reduction",
     "cayley",
     "scipy",
     "dense",
     "dense QZ",
 )
-MOST = {"dense": 300, "dense QZ": 100, "scipy": 10_000}
+MOST = {"dense": 300, "dense QZ": 100, "scipy": 10_000, "slicing": 10_000}
 POINTWISE = MOST | {"reduction": 10_000, "cayley": 10_000}
 LIMIT = 150.0
 """Seconds after which a process that measures is stopped."""

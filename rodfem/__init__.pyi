@@ -13,6 +13,7 @@ from rodfem.codim2.locus import Locus as Locus
 from rodfem.continuation.branch import Branch as Branch
 from rodfem.continuation.branch import Point as Point
 from rodfem.continuation.branch import SpecialPoint as SpecialPoint
+from rodfem.continuation.follow import IndexStepControl as IndexStepControl
 from rodfem.continuation.follow import StepControl as StepControl
 from rodfem.continuation.observer import Observer as Observer
 from rodfem.diagram.diagram import Diagram as Diagram

@@ -107,7 +107,8 @@ def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, 
     try:
         data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as trouble:
-        raise InputError(f"There is no {path}: give {form.file}.") from trouble
+        also = ", or the folder of one: rodfem list names those below a folder" if form is DIAGRAM else ""
+        raise InputError(f"There is no {path}: give {form.file}{also}.") from trouble
     except (OSError, ValueError, RecursionError) as trouble:
         raise InputError(f"{path} is no {form.name} ({trouble}): give {form.file}.") from trouble
     form.check(data, path, needs)

@@ -113,7 +113,7 @@ for length, elements, formulation in runs:
     found.append((event.point.load, event.error_estimate))
     bar = f", error below {event.error_estimate:.0e}" if length == 1.0 else ""
     print(f"length {length}, {elements} elements, {formulation}: T = {event.point.load:.7f}{bar}")
-verdicts = [diagram.assess(event, method, number=2) for method in ("count", "shift-invert", "reduction")]
+verdicts = [diagram.assess(event, method, number=2) for method in ("count", "slicing", "reduction")]
 print(*verdicts, sep="\n")  # three ways to count
 
 # %% [markdown]

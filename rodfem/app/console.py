@@ -29,6 +29,8 @@ Equilibria of nonlinearly elastic rods: which are stable, and at which load stab
 rodfem COMMAND --help lists the arguments of a command.
 """
 UNFIT = "{} lacks what a diagram has, or has something else there ({{}}): run the scene again."
+HEADS = {"folder": 28, "scene": 16, "date": 10, "branches": 8, "special": 7}
+"""Columns of ``rodfem list``, and their widths."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -118,6 +120,46 @@ def info(words: Sequence[str]) -> None:
         print("\n".join([*lines, *(f"  {sentence}" for sentence in in_sentences(data))]))
 
 
+def list_diagrams(words: Sequence[str]) -> None:
+    """Saved diagrams below a folder: scene, date, size, what the first branch does."""
+    parser = Parser(prog="rodfem list", description=_summary(list_diagrams))
+    parser.add_argument("folder", type=Path, nargs="?", default=Path("results"), help="default: results")
+    place = parser.parse_args(words).folder
+    files = sorted(place.rglob("diagram.json"))
+    if not files:
+        raise InputError(f"No folder in {place} has a diagram.json: run a scene, or name a folder with results.")
+    print("\n".join([_row(*HEADS, "in words"), *map(_diagram, files)]))
+
+
+def _diagram(file: Path) -> str:
+    """Line of a diagram; a file that is none has its reason in place of numbers."""
+    from rodfem.file_format import DIAGRAM, read_json, refusal
+    from rodfem.output.summary import in_sentences
+
+    name = str(file.parent)
+    try:
+        data = read_json(file, DIAGRAM, ("scene", "parameter", "branches"))
+        with refusal(UNFIT.format(file)):
+            date, branches = str((data.get("origin") or {}).get("date", ""))[: HEADS["date"]], data["branches"]
+            special = sum(len(branch["special"]) for branch in branches)
+            words = in_sentences(data)[0].partition("\n")[0] if branches else "no branches"
+            return _row(name, data["scene"], date, str(len(branches)), str(special), words)
+    except InputError as trouble:
+        return f"{name:<{HEADS['folder']}} {trouble}"
+
+
+def _row(*cells: str) -> str:
+    *others, last = cells
+    return " ".join([*(f"{cell:<{width}}" for cell, width in zip(others, HEADS.values(), strict=True)), last])
+
+
+def many(words: Sequence[str]) -> None:
+    """Trace a rod for each line of a table of its constants and options."""
+    from rodfem.app.main import many_main
+
+    many_main(words)
+
+
 def run(words: Sequence[str]) -> None:
     """Trace the rod of a file, with its constants as options."""
     from rodfem.app.main import main as run_file
@@ -145,6 +187,8 @@ COMMANDS = {
     "convert": convert,
     "explain": explain,
     "info": info,
+    "list": list_diagrams,
+    "many": many,
     "run": run,
     "view": view,
 }

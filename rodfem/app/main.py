@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
-from functools import cache
+from functools import cache, partial
+from hashlib import sha256
 from inspect import Parameter, cleandoc, getdoc, isfunction, signature
 from pathlib import Path
 from types import ModuleType
@@ -88,6 +90,84 @@ def _written(output: Path) -> int:
     """When the diagram in a folder was written, 0 without one."""
     file = output / "diagram.json"
     return file.stat().st_mtime_ns if file.is_file() else 0
+
+
+COLUMNS = "a column is a constant, an option of rodfem run without its dashes (elements), or a field of Plan (steps)"
+
+
+def many_main(words: Sequence[str]) -> None:
+    """Trace the rods of a table, all stated before any is traced, and write the table of what is special of them."""
+    parser = Parser(prog="rodfem many", description="Trace a rod of a file once for each line of a table.")
+    parser.add_argument("file", type=Path, help="as rodfem run has it")
+    parser.add_argument("table", type=Path, help=f"CSV with a line for each rod; {COLUMNS}")
+    parser.add_argument("--scene", metavar="NAME", help="of several in the file")
+    parser.add_argument("--output", type=folder, default=Path("results/many"), metavar="DIR", help="for all files")
+    given = parser.parse_args(words)
+    statement = Statement.of(load(given.file), given.scene)
+    options = parser_of(statement, statement.scene(), f"rodfem run {given.file}")
+    start_petsc([])
+    with sentences(options):
+        rows = _rows(given.table, options)
+        _trace(given, rows, [_asked(row, statement, options, f"{given.table}, rod {i}") for i, row in enumerate(rows)])
+
+
+def _column_options(options: Parser) -> dict[str, argparse.Action]:
+    """Options by the names that a column may have."""
+    found = {action.dest: action for action in options._actions if action.dest not in ("help", "output")}
+    return found | {x.option_strings[0][2:]: x for x in found.values()} | {"steps": found["largest"]}
+
+
+def _rows(table: Path, options: Parser) -> list[dict[str, str]]:
+    """Lines of a table; raises :class:`InputError` for one without lines, or with a column that no rod has."""
+    try:
+        rows = list(csv.DictReader(table.read_text(encoding="utf-8-sig").splitlines()))
+    except (OSError, ValueError) as trouble:
+        raise InputError(f"{table} cannot be read ({trouble}): give a table of text.") from trouble
+    if unknown := [name for name in (rows or [{"": ""}])[0] if name not in _column_options(options)]:
+        what = f"has a column {unknown[0]!r}" if rows else "has no line of a rod"
+        raise InputError(f"{table} {what}: {COLUMNS}; {options.prog} --help lists them.")
+    return rows
+
+
+def _asked(row: Mapping[str, str], statement: Statement, options: Parser, where: str) -> Asked:
+    """Scene, mesh and plan of a line, of which an empty cell is the default; raises :class:`InputError` with it."""
+    words = list[str]()
+    for name, cell in row.items():
+        action, values = _column_options(options)[name], (cell or "").split()
+        if isinstance(action, argparse.BooleanOptionalAction) and cell.lower() in ("true", "false"):
+            words.append(action.option_strings[cell.lower() == "false"])
+        elif values:
+            words += [action.option_strings[0], *values]
+    try:
+        scene, discretization, plan = statement.asked(options.parse_args(words))
+        plan.check(scene, discretization)
+    except InputError as trouble:
+        raise InputError(f"{where}: {trouble}") from None
+    return scene, discretization, plan
+
+
+def _trace(given: argparse.Namespace, rows: Sequence[dict[str, str]], asked: Sequence[Asked]) -> None:
+    """Trace all rods that have not been traced, and write the table of their special points; collective."""
+    from mpi4py import MPI
+
+    from rodfem.app.many import key_of, shared
+    from rodfem.diagram.diagram import trace
+    from rodfem.output.states import as_csv
+    from rodfem.ranks import on_first
+    from rodfem.whole_files import write_whole
+
+    def work(number: int) -> dict[str, Any]:
+        diagram = trace(*asked[number], comm=MPI.COMM_SELF)
+        diagram.save(given.output / f"rod-{number:05d}")
+        return {"special": [{"branch": b["name"]} | s for b in diagram.data["branches"] for s in b["special"]]}
+
+    target, text, comm = given.output / "many.csv", sha256(given.file.read_bytes()).hexdigest(), MPI.COMM_WORLD
+    keys = [key_of(scene) | {"row": row, "file": text} for (scene, *_), row in zip(asked, rows, strict=True)]
+    results = shared(keys, [partial(work, i) for i in range(len(rows))], given.output, comm, lambda done, whole: None)
+    found = [(row | {"rod": i}, r.get("special") or [r]) for i, (row, r) in enumerate(zip(rows, results, strict=True))]
+    on_first(comm, lambda: write_whole({target: as_csv([rod | entry for rod, each in found for entry in each])}))
+    if comm.rank == 0:
+        print(target)
 
 
 def _run(statement: Statement, options: argparse.Namespace, petsc: Sequence[str], words: Callable[[str], str]) -> None:

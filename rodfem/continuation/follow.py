@@ -28,7 +28,7 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import VIOLATED, violation
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
-from rodfem.problem.arguments import real, whole
+from rodfem.problem.arguments import finite, real, whole
 from rodfem.tolerances import NEGLIGIBLE, SAME_LOAD
 
 FAILURES = 2
@@ -75,6 +75,31 @@ class StepControl:
         """Length of the next step; the correction ``moved`` the prediction, that of a predictor of an ``order``."""
         factor = (self.aim / max(moved, NEGLIGIBLE)) ** (1 / order)
         return min(step * min(max(factor, 0.4), 1.6), self.largest)
+
+    def accepts(self, before: Point, after: Point) -> bool:
+        """Whether a step that has converged is kept; else half of it is tried."""
+        return True
+
+
+@dataclass(frozen=True)
+class IndexStepControl(StepControl):
+    """Steps over which the index changes by no more than a bound: there is a row between nearly equal points."""
+
+    change: int = 1  #: greatest change of the index from row to row
+    resolved: float = 1e-4  #: length of a step that is kept nevertheless: eigenvalues may be multiple
+
+    def __post_init__(self) -> None:
+        """Check the bound, too; raises :class:`InputError`."""
+        super().__post_init__()
+        if whole(IndexStepControl.change)("change", self.change) < 1:
+            raise InputError(f"A change of the index of {self.change} leads nowhere: give change=1 or more.")
+        if finite(IndexStepControl.resolved)("resolved", self.resolved) < 0:
+            raise InputError(f"resolved is {self.resolved:g}: give zero or more, as in resolved=1e-4.")
+
+    def accepts(self, before: Point, after: Point) -> bool:
+        """Whether the index has changed by no more than the bound, or the step is as short as it needs be."""
+        small = after.arclength - before.arclength <= self.resolved
+        return small or abs(after.negative - before.negative) <= self.change
 
 
 def follow(
@@ -160,7 +185,7 @@ class _Walk:
             return None
         place = known[-1].arclength + made.length
         point = self.solver.point(made.x, place, made.tangent, made.outcome, made.index)
-        if not self._stays(known, point):
+        if not self._stays(known, point) or not self.steps.accepts(known[-1], point):
             return None
         order = 2 if len(known) == 1 else min(len(known), 3) + 1
         self._next, self._offset = self.steps.after(self._step, made.outcome.moved, order), 0.0

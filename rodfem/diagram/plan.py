@@ -13,7 +13,7 @@ from rodfem.problem.events import Event, Level
 from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
-from rodfem.stability import AUTO, find
+from rodfem.stability import AUTO, METHODS, find
 
 COUNTS = {
     "depth": "depth",
@@ -161,7 +161,7 @@ class Plan:
         ):
             if asked and not self.at:
                 raise InputError(f"{words}: give them in Plan(at=...).")
-        if self.modes and self.method == "count":
+        if self.modes and self.method in METHODS and not find(self.method).finds_modes:
             raise InputError(
                 "Counting alone finds no modes: leave out Plan(modes=...), or name another Plan(method=...)."
             )

@@ -19,6 +19,7 @@ METHODS = {
     "dense": "rodfem.stability.assessment",
     "reduction": "rodfem.kumar_healey.reduction",
     "shift-invert": "rodfem.stability.assessment",
+    "slicing": "rodfem.stability.assessment",
 }
 """Methods that decide stability, and where each has its class (``ShiftInvert``), loaded when it is used."""
 

@@ -232,10 +232,7 @@ class SymmetricSolver(PencilMatrices):
 
     def eigensolver(self, number: int, start: PETSc.Vec) -> SLEPc.EPS:
         """Set up shift-invert for the ``number`` eigenvalues nearest to the shift that was factored."""
-        solver = SLEPc.EPS().create(self.system.comm)
-        solver.setOptionsPrefix("rodfem_")
-        solver.setOperators(*self.scaled)
-        solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+        solver = eigensolver(*self.scaled, "rodfem_")
         solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
         solver.setTarget(self.shift)
         # in a Krylov space with fewer vectors restarts cost more
@@ -246,7 +243,6 @@ class SymmetricSolver(PencilMatrices):
         if self.deflated:
             solver.setDeflationSpace(self.deflated)
         transform = solver.getST()
-        transform.setType(SLEPc.ST.Type.SINVERT)
         transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
         ksp = transform.getKSP()
         ksp.setType("preonly")
@@ -268,6 +264,16 @@ class SymmetricSolver(PencilMatrices):
             residual = S * vector - M * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
         return np.array(errors)
+
+
+def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
+    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite."""
+    solver = SLEPc.EPS().create(matrix.comm)
+    solver.setOptionsPrefix(prefix)
+    solver.setOperators(matrix, mass)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.getST().setType(SLEPc.ST.Type.SINVERT)
+    return solver
 
 
 class _Inverse:

@@ -1,6 +1,8 @@
 """Many rods: shared among ranks, kept in files, and taken up again."""
 
+import csv
 import json
+import re
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -12,6 +14,7 @@ from demo_cases import scene
 from mpi4py import MPI
 
 from rodfem import InputError, Plan, Scene, SceneError, family, many
+from rodfem.app.console import main
 
 COMM = MPI.COMM_WORLD
 
@@ -56,6 +59,56 @@ def test_a_result_of_a_newer_format_is_kept(folder: Path) -> None:
     with pytest.raises(InputError, match=r"rod-00001.json was written by rodfem 9.1, in version 2 of the format"):
         many(rods, lambda rod: {}, folder)
     assert file.read_text() == text
+
+
+STRUT = """
+from rodfem import Ordinate, Parameter, Scene, clamped, free
+from rodfem.forms.energy import bending_and_twist
+
+def strut(B: float = 1.0) -> Scene:
+    return Scene(
+        "strut", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (c.B, 2 * c.B, 0.8)),
+        {"P": Parameter(0.0), "B": Parameter(B)}, "P", (clamped(), free(force=lambda c: (0, 0, -c.P))),
+        Ordinate("tip", s=1.0, of=lambda r, q: r[1]), (2.0, 4.0),
+    )
+"""
+
+
+def test_a_table_has_a_rod_in_each_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Columns are constants, options and fields of a plan; Euler's load is B pi^2/4."""
+    file, table = folder / "strut.py", folder / "rods.csv"
+    file.write_text(STRUT)
+    table.write_text("B,elements,steps,depth,at\n1.0,4,0.3,0,2.1 2.2\n1.5,,,0,\n3.0,,,0,\n")
+    main(["many", str(file), str(table), "--output", str(folder / "many")])
+    assert capsys.readouterr().out.strip() == str(folder / "many" / "many.csv")
+    lines = list(csv.DictReader((folder / "many" / "many.csv").read_text().splitlines()))
+    assert [(x["B"], x["load"]) for x in lines if x["kind"] == "user"] == [("1.0", "2.1"), ("1.0", "2.2")]
+    for line in (x for x in lines if x["kind"] == "branch point"):
+        assert abs(float(line["load"]) - float(line["B"]) * pi**2 / 4) <= float(line["error_estimate"])
+    saved = [json.loads((folder / "many" / f"rod-0000{i}" / "diagram.json").read_text()) for i in range(3)]
+    assert [x["discretization"]["elements"] for x in saved] == [4, 8, 8]
+    assert "largest=0.3" in saved[0]["asked"]["plan"]["steps"] and len(saved[2]["branches"][0]["special"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            "B,elemnts\n1,4\n",
+            "has a column 'elemnts': a column is a constant, an option of rodfem run .* --help lists them",
+        ),
+        ("B,at\n1,3\n1,77\n", "rod 1: The load 77 asked for is outside the range 2 to 4"),
+        ("B\n", "has no line of a rod"),
+    ],
+)
+def test_a_table_is_refused_before_any_rod_is_traced(
+    folder: Path, capsys: pytest.CaptureFixture[str], text: str, sentence: str
+) -> None:
+    (folder / "strut.py").write_text(STRUT)
+    (folder / "rods.csv").write_text(text)
+    with pytest.raises(SystemExit):
+        main(["many", str(folder / "strut.py"), str(folder / "rods.csv"), "--output", str(folder / "many")])
+    assert re.search(sentence, capsys.readouterr().err) and not (folder / "many").exists()
 
 
 def test_a_family_has_the_critical_loads_of_every_rod(folder: Path) -> None:

@@ -1,5 +1,6 @@
 """Following branches: exact loads, either direction, restarts from files, and the work of the ends."""
 
+from itertools import pairwise
 from math import pi
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from hard.writhing import clamped_rod
 from hemitropic_cases import DEFAULT, explored, follower, specials, user_points
 
 import rodfem
-from rodfem import Branch, Discretization, InputError, Plan, SceneError, StepControl, trace
+from rodfem import Branch, Discretization, IndexStepControl, InputError, Plan, Point, SceneError, StepControl, trace
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.output.files import load_state, states_of
@@ -126,6 +127,30 @@ def test_restart_from_what_is_not_there(folder: Path) -> None:
             load_state(*wrong, follower())
     with pytest.raises(InputError, match="states of the reduced formulation"):
         load_state(path, "straight", 0, follower("pointwise"))
+
+
+def test_steps_that_bound_the_change_of_the_index() -> None:
+    """Euler's loads of a pinned column of nearly equal stiffnesses, ``pi^2`` and ``1.0001 pi^2``: a row between."""
+    rod = classics.column(
+        "euler", classics.SUPPORTS["pinned-pinned"], (8.0, 12.0), constants={"B2": 1.0001}
+    )  # fmt: skip
+    found = {
+        kind: rodfem.trace(rod, plan=Plan(depth=0, steps=kind(largest=0.2, first=0.2), error_bars=False))[0]
+        for kind in (StepControl, IndexStepControl)
+    }
+    changes = {kind: {abs(a.index - b.index) for a, b in pairwise(_rows(b))} for kind, b in found.items()}
+    assert changes == {StepControl: {0, 2}, IndexStepControl: {0, 1}}
+    for branch in found.values():
+        loads = [s.point.load for s in branch.special if s.kind == "branch point"]
+        assert loads == pytest.approx([np.pi**2, 1.0001 * np.pi**2], rel=1e-9)
+    with pytest.raises(InputError, match="A change of the index of 0 leads nowhere: give change=1 or more"):
+        IndexStepControl(change=0)
+
+
+def _rows(branch: Branch) -> list[Point]:
+    """Points of a branch without its special points."""
+    special = {id(s.point) for s in branch.special if s.kind == "branch point"}
+    return [p for p in branch.points if id(p) not in special]
 
 
 @pytest.mark.ranks

@@ -22,7 +22,7 @@ from rodfem.modes.finder import ModeFinder, Motions
 from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
 
 FINE = Discretization("reduced", 6, 6)
-METHODS = ("shift-invert", "cayley", "reduction")
+METHODS = ("shift-invert", "cayley", "slicing", "reduction")
 """That work on all ranks."""
 
 

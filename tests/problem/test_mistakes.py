@@ -21,6 +21,7 @@ from rodfem import (
     Discretization,
     End,
     Event,
+    IndexStepControl,
     Inertia,
     InputError,
     Ordinate,
@@ -200,6 +201,7 @@ PLANS: list[tuple[Callable[[], Any], str]] = [
     *((lambda x=x: event(lambda s: x), "event 'ends meet' fails") for x in (None, "1", True, 1j, np.zeros(3))),
     (lambda: control(first=INF), "first = inf lead"),
     (lambda: control(first=1e-7), "first step of 1e-07 is out of bounds"),
+    *((lambda x=x: Plan(steps=IndexStepControl(resolved=x)), "resolved is") for x in (NAN, INF, -1.0, "a")),
     (lambda: Discretization(elements=10**9), "too large"),
     (lambda: Discretization(elements=8.0), "elements is 8.0: give a whole number, as in elements=8"),  # type: ignore[arg-type]
     (lambda: Discretization(elements=1, vertices=("0", "1")), r"vertices\[0\] is '0': give a number"),  # type: ignore[arg-type]

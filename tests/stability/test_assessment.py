@@ -117,13 +117,13 @@ def test_names() -> None:
     assessor, x = at("cord", "reduced", 20.0, False)
     with pytest.raises(
         InputError,
-        match=r"Unknown method 'magic': choose one of auto, cayley, count, dense, reduction, shift-invert\.",
+        match=r"Unknown method 'magic': choose one of auto, cayley, count, dense, reduction, shift-invert, slicing\.",
     ):
         assessor(x, "magic")
     with pytest.raises(InputError, match="ask for none or more"):
         assessor(x, "auto", -1)
     system, y = plain("follower", "pointwise", *SMALL, 10.0)
-    for method in ("count", "cayley"):
+    for method in ("count", "cayley", "slicing"):
         with pytest.raises(InputError, match=r"symmetric pencil.*: choose one of dense, reduction, shift-invert\."):
             Assessor(system)(y, method)
     with pytest.raises(InputError, match="Unknown method 'magic'"):
@@ -439,7 +439,7 @@ def test_elimination_by_the_paper_s_formula(coordinates: str) -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("method", ["auto", "dense", "shift-invert", "cayley"])
+@pytest.mark.parametrize("method", ["auto", "dense", "shift-invert", "slicing", "cayley"])
 def test_there_are_no_more_than_the_nodes_that_turn(method: str) -> None:
     """Between clamps 2 elements of degree 2 have 3 nodes that turn, by 3 angles each: 9.
 

@@ -18,7 +18,7 @@ ANY_UNITS = pytest.mark.parametrize(
 )
 LOADS = [(0.0, 0), (2.3, 0), (4.0, 1)]
 """Thrusts in units of stiffness over squared length, and the index."""
-METHODS = ["auto", "shift-invert", "reduction", "cayley", "dense"]
+METHODS = ["auto", "shift-invert", "slicing", "reduction", "cayley", "dense"]
 
 
 def cantilever(length: float, stiffness: float, mass: float) -> Scene:

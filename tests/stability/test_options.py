@@ -12,7 +12,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import ReducedPencil
-from rodfem.stability.assessment import Assessor
+from rodfem.stability.assessment import Assessor, in_interval
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 ORDERING = 2
@@ -34,7 +34,7 @@ def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
     system, x = cord()
     system.at(x).factor(system.load_axis())
     assessor = Assessor(system)
-    for method in ("count", "shift-invert"):
+    for method in ("count", "shift-invert", "slicing"):
         assessor(x, method, 2)
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
     vibration = NonsymmetricSolver(system).at(x)
@@ -62,9 +62,16 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
     options["rodfem_eps_ncv"], options["rodfem_eps_tol"] = 17, 1e-7
     system, x = cord()
     assessor = Assessor(system)
+    expected = assessor(x, "shift-invert", 3).values
     spectrum = assessor.symmetric
     solver = spectrum.at(x).eigensolver(3, spectrum.inertia.seed(1))
     assert (solver.getDimensions()[1], solver.getTolerances()[0]) == (17, 1e-7)
+    options["rodfem_slicing_eps_tol"], options["rodfem_slicing_st_mat_mumps_icntl_7"] = 1e-8, ORDERING
+    solver = in_interval(spectrum.matrix, spectrum.mass, -20.0, 30.0)
+    solver.solve()
+    assert solver.getTolerances()[0] == 1e-8
+    assert solver.getKrylovSchurKSP().getPC().getFactorMatrix().getMumpsIcntl(7) == ORDERING
+    np.testing.assert_allclose(sorted(solver.getEigenvalue(i).real for i in range(3)), expected, rtol=1e-8)
 
 
 def test_reduced_pencil(options: PETSc.Options) -> None:
