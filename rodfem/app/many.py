@@ -8,15 +8,19 @@ compared: if one of them has changed, choose another folder.
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import product, zip_longest
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
+from rodfem.codim2.rods import NUMBERS, Rods, continued
 from rodfem.diagram.diagram import MESH, PLAN, trace
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import RANKS, SCENE
@@ -32,11 +36,11 @@ from rodfem.ranks import as_failure, end_together, on_first
 from rodfem.whole_files import locked
 
 Work = Callable[[Scene], dict[str, Any]]
-NUMBERS = {
-    **{"critical_load": "load", "error": "error_estimate", "ordinate": "ordinate"},
-    **{"index_before": "negative_before", "index_after": "negative_after"},
-}
+OF_POINT = dict(zip(NUMBERS, ("load", "error_estimate", "ordinate", "negative_before", "negative_after"), strict=True))
 """What a family has of a special point, and the entries of files."""
+WIDTH = 40  # of a bar
+MODELS = 8  # traced rods, with those continued from them, that others may be continued from
+TRIED = 2  # of these, the nearest ones, before a rod is traced
 
 
 def key_of(scene: Scene) -> dict[str, Any]:
@@ -157,10 +161,12 @@ def family(
     rod the special points of its first branch, or of all that the ``plan`` asks for, are along the dimension ``point``,
     by their loads: ``kind``, ``critical_load``, its ``error``, ``ordinate``, ``index_before`` and ``index_after``, nan
     beyond their number.  ``first_loss`` is the load at which the first branch loses its stability, nan if it does not
-    or begins unstable.  Where a rod fails, ``trouble`` is the sentence.
+    or begins unstable.  Where a rod fails, ``trouble`` is the sentence.  Rods are continued from their neighbours where
+    these have the same special points (:mod:`rodfem.codim2.rods`), else traced.
 
-    ``folder``, and ``comm`` and ``progress`` of ``sharing``, are as for :func:`many`, which keeps each rod in a file:
-    an interrupted family goes on, and ranks share it; another plan or ``discretization`` wants another folder.  Raises
+    ``folder``, and ``comm`` and ``progress`` of ``sharing``, by default a bar on a terminal, are as for :func:`many`,
+    which keeps each rod in a file: an interrupted family goes on, and ranks share it; another plan or
+    ``discretization`` wants another folder.  Raises
     :class:`~rodfem.errors.InputError` for what is no constant of the scene, and
     :class:`~rodfem.errors.SetupError` without xarray.
     """
@@ -170,14 +176,28 @@ def family(
         raise InputError(
             f"over is {over!r}: give values of constants other than the load, as in {{'A': (-1.5, -1.0)}}."
         )
-    rods = [scene.varying(**dict(zip(values, map(float, each), strict=True))) for each in product(*values.values())]
-    work = partial(_critical, plan=plan or Plan(depth=0), discretization=discretization or Discretization())
-    found = many(rods, work, folder, **sharing)
+    for name, column in values.items():
+        for value in column.tolist():
+            scene.check_constant(name)
+            scene.parameters[name].check(name, value)
+    each = [*product(*(column.tolist() for column in values.values()))]
+    rods = _Rods(scene, [*values], np.array([np.ptp(x) or 1.0 for x in values.values()]), (plan, discretization))
+    common, how = key_of(scene), dict[str, Any](comm=MPI.COMM_WORLD, progress=bar) | sharing
+    keys = [common | {"constants": common["constants"] | dict(zip(values, x, strict=True))} for x in each]
+    found = shared(keys, [partial(rods, x) for x in each], folder, **how)
     of_rods, of_points = _columns(found)
     shape = tuple(map(len, values.values()))
     data = {name: ([*values], column.reshape(shape)) for name, column in of_rods.items()}
     data |= {name: ([*values, "point"], table.reshape(*shape, -1)) for name, table in of_points.items()}
     return xarray.Dataset(data, values, {"scene": scene.name, "load": scene.load})
+
+
+def bar(done: int, count: int) -> None:
+    """Draw a bar of what is done of all rods, if the errors of the program go to a terminal."""
+    if sys.stderr.isatty():
+        part = WIDTH * done // count
+        sys.stderr.write(f"\r[{'#' * part}{' ' * (WIDTH - part)}] {done} of {count} rods" + "\n" * (done == count))
+        sys.stderr.flush()
 
 
 def _columns(found: Sequence[dict[str, Any]]) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
@@ -193,13 +213,36 @@ def _columns(found: Sequence[dict[str, Any]]) -> tuple[dict[str, np.ndarray], di
     return of_rods, of_points
 
 
-def _critical(rod: Scene, plan: Plan, discretization: Discretization) -> dict[str, Any]:
-    """Special points of a rod, by their loads, and where its first branch loses its stability."""
-    diagram = trace(rod, discretization, plan, comm=MPI.COMM_SELF)
-    points = sorted(map(special_data, diagram.special()), key=lambda special: special["load"])
-    stable = not diagram[0].points[0].negative  # at first
-    lost = [s.point.load for s in diagram[0].special if stable and s.negative_after > s.negative_before == 0]
-    return {
-        "points": [{"kind": x["kind"]} | {name: x[entry] for name, entry in NUMBERS.items()} for x in points],
-        "first_loss": next(iter(lost), None),
-    }
+class _Rods:
+    """Rods of a family, by the values of the constants ``names``: each continued from rods near by, or traced."""
+
+    def __init__(
+        self, scene: Scene, names: list[str], sizes: np.ndarray, how: tuple[Plan | None, Discretization | None]
+    ) -> None:
+        self.scene, self.names, self.sizes = scene, names, sizes
+        self.plan, self.mesh = how[0] or Plan(depth=0), how[1] or Discretization()
+        self.models: list[Rods] = []
+
+    def __call__(self, values: tuple[float, ...]) -> dict[str, Any]:
+        """Special points of a rod, by their loads, and where its first branch loses its stability."""
+        for model in sorted(self.models, key=lambda model: model.distance(values, self.sizes))[:TRIED]:
+            with suppress(ConvergenceError):
+                return _result_of(model.at(values, self.sizes), model.indices[0])
+        return self._traced(values)
+
+    def _traced(self, values: tuple[float, ...]) -> dict[str, Any]:
+        """The same by a diagram, from which others may be continued."""
+        rod = self.scene.varying(**dict(zip(self.names, values, strict=True)))
+        diagram = trace(rod, self.mesh, self.plan, comm=MPI.COMM_SELF)
+        first, every = diagram[0], [*map(special_data, diagram.special())]
+        if len(diagram) == 1 and rod.conservative and continued(first, self.plan.load_range(rod)):
+            bars = self.plan.error_bars
+            self.models = [*self.models[1 - MODELS :], Rods(first, self.names, error_bars=bars)]
+        points = [{"kind": x["kind"]} | {name: x[entry] for name, entry in OF_POINT.items()} for x in every]
+        return _result_of(points, first.points[0].negative)
+
+
+def _result_of(points: list[dict[str, Any]], index: int) -> dict[str, Any]:
+    """Special points in the order of their loads, and the first loss of a branch that begins with an ``index``."""
+    lost = [x["critical_load"] for x in points if not index and x["index_after"] > x["index_before"] == 0]
+    return {"points": sorted(points, key=itemgetter("critical_load")), "first_loss": next(iter(lost), None)}

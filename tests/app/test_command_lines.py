@@ -92,8 +92,8 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
     ("program", "line", "words"),
     [
         ("map", "--couplings 99999999999999", "at most 10000"),
-        ("map", "--couplings 2 --loads 2 --output /proc/x", "cannot be written"),
-        ("map", "--couplings 2 --loads 2 --output ''", "name of the folder is empty"),
+        ("map", "--couplings 2 --output /proc/x", "cannot be written"),
+        ("map", "--couplings 2 --output ''", "name of the folder is empty"),
         ("follower", "--formulation reduced", "use --formulation pointwise"),
     ],
 )

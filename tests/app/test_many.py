@@ -6,13 +6,17 @@ import re
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from time import process_time
 from typing import Any
 
+import closed_form_hemitropic
+import hemitropic_cases
 import numpy as np
 import pytest
 from demo_cases import scene
 from mpi4py import MPI
 
+import rodfem.app.many as many_rods
 from rodfem import InputError, Plan, Scene, SceneError, family, many
 from rodfem.app.console import main
 
@@ -122,3 +126,46 @@ def test_a_family_has_the_critical_loads_of_every_rod(folder: Path) -> None:
     assert again.identical(found)
     with pytest.raises(InputError, match="constants other than the load"):
         family(scene("cord"), {"lam": (1.0,)}, folder)
+
+
+def assert_closed_form(found: Any) -> None:
+    """Compare all critical loads of straight hemitropic rods, with what their indices are in between."""
+    for rod in (found.isel(A=i, C=j) for i in range(found.A.size) for j in range(found.C.size)):
+        exact = closed_form_hemitropic.loads(float(rod.A), 1.0, float(rod.C), 3.0)
+        own = rod.critical_load.values
+        assert own[np.isfinite(own)] == pytest.approx(exact, abs=1e-9)
+        assert float(rod.first_loss) == own[0] and rod.trouble == ""
+        steps = closed_form_hemitropic.index(0.5 * (exact[0] + exact[1]), float(rod.A), 1.0, float(rod.C), 3.0)
+        assert rod.index_after.values[0] == steps
+
+
+def test_rods_of_a_family_are_continued_from_their_neighbours(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 30 rods with two to four critical loads few are traced, and all have those of the closed form."""
+    pytest.importorskip("xarray")
+    traced = list[float]()
+    follow = many_rods.trace
+    monkeypatch.setattr(many_rods, "trace", lambda rod, *a, **k: traced.append(1) or follow(rod, *a, **k))
+    over = {"A": np.linspace(-3.0, 0.0, 15), "C": [1.0, 1.02]}
+    found = family(hemitropic_cases.scene(), over, folder, Plan(depth=0, error_bars=False), comm=MPI.COMM_SELF)
+    assert {*np.isfinite(found.critical_load).sum("point").values.ravel()} == {2, 3, 4}
+    assert_closed_form(found)
+    assert len(traced) <= 8
+
+
+def test_errors_of_a_family_are_bounds(folder: Path) -> None:
+    """Of rods that were traced and of those that were continued."""
+    pytest.importorskip("xarray")
+    found = family(hemitropic_cases.scene(), {"A": np.linspace(-3.0, -2.6, 4), "C": [1.0]}, folder)
+    for rod in (found.isel(A=i, C=0) for i in range(4)):
+        exact = closed_form_hemitropic.loads(float(rod.A), 1.0, 1.0, 3.0)
+        assert (abs(rod.critical_load.values[:2] - exact) <= rod.error.values[:2] + 1e-14).all()
+
+
+@pytest.mark.long
+def test_a_thousand_rods_in_a_minute(folder: Path) -> None:
+    """On one core, with the closed form of each."""
+    pytest.importorskip("xarray")
+    over, begun = {"A": np.linspace(-3.0, 0.0, 40), "C": np.linspace(0.8, 1.2, 25)}, process_time()
+    found = family(hemitropic_cases.scene(), over, folder, Plan(depth=0, error_bars=False), comm=MPI.COMM_SELF)
+    assert process_time() - begun < 60.0
+    assert_closed_form(found)
