@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import reference_values
 from classics import SUPPORTS, column
-from hard.fuzz import wider
 from hard.two_freedoms import scene as two_freedoms
 from mpi4py import MPI
 from scipy.integrate import OdeSolution, solve_ivp
@@ -253,7 +252,7 @@ def test_the_location_of_a_branch_point_is_in_the_bar_of_its_ordinate(monkeypatc
 @pytest.mark.long
 def test_ordinate_of_a_branch_point_beside_a_soft_mode() -> None:
     """A nearly round column (1e-8) buckles; where it is straight its mode may turn by 1e-9, and 3e-10 are measured."""
-    scene = wider.scene(14, 454)[0]
+    scene = column("nearly round", SUPPORTS["clamped-free"], (0.0, 3.0), constants={"B2": 1.0 + 1e-8})
     bars = []
     for mesh in (Discretization("auto", 5, 6), Discretization("pointwise", 7, 5)):
         (lost,) = (s for s in trace(scene, mesh, Plan(depth=0))[0].special if s.kind == BRANCH_POINT)
