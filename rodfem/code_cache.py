@@ -14,8 +14,13 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
+
+_LOADED: dict[Path, Any] = {}
+"""Modules by their files."""
+UNLOADABLE = "What was compiled in {} cannot be loaded: set XDG_CACHE_HOME to a folder from which programs may run."
 
 
 def folder() -> Path:
@@ -40,6 +45,22 @@ def refused(error: OSError) -> str:
         f"The folder {folder()}, which keeps compiled code, cannot be written ({error.strerror or error}): set "
         "XDG_CACHE_HOME to a folder that can be written."
     )
+
+
+def load(name: str, file: Path) -> Any:
+    """The compiled module of a ``file``, the same each time; None for a damaged one, which is removed."""
+    if file in _LOADED:
+        return _LOADED[file]
+    spec = spec_from_file_location(name, file)
+    assert spec is not None and spec.loader is not None
+    try:
+        module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+    except ImportError:
+        with suppress(OSError):
+            file.unlink()
+        return None
+    return _LOADED.setdefault(file, module)
 
 
 class Job:

@@ -9,6 +9,7 @@ each entry, group and column.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -83,6 +84,8 @@ LOCUS = Format("rodfem locus", "a locus-1.json, locus-2.json ... of a run with P
 RESULT = Format("rodfem result", "a rod-00000.json, rod-00001.json ... of rodfem.many")
 FORMATS = (DIAGRAM, STATES, MODES, LOCUS, RESULT)
 
+CONTROL = re.compile(r"\\(?:\\|u00(?:0[0-8bcef]|[189][0-9a-f]|7f))|[\x7f-\x9f]", re.IGNORECASE)
+"""Characters of a JSON text that a terminal obeys, as JSON writes them, and a backslash, which is none."""
 UNREADABLE = (
     *(OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, MemoryError, ArithmeticError),
     np.linalg.LinAlgError,
@@ -103,9 +106,13 @@ def refusal(unfit: str) -> Iterator[None]:
 
 
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
-    """Contents of a JSON file; raises :class:`InputError` where it cannot be read, and as :meth:`Format.check` does."""
+    """Contents of a JSON file, whose texts have no characters that a terminal obeys but ends of lines and tabs.
+
+    Raises :class:`InputError` if it cannot be read, and as :meth:`Format.check` does.
+    """
     try:
-        data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        text = CONTROL.sub(lambda found: found[0] if found[0] == r"\\" else "\ufffd", path.read_text(encoding="utf-8"))
+        data: dict[str, Any] = json.loads(text)
     except FileNotFoundError as trouble:
         also = ", or the folder of one: rodfem list names those below a folder" if form is DIAGRAM else ""
         raise InputError(f"There is no {path}: give {form.file}{also}.") from trouble

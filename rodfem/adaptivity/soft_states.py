@@ -6,7 +6,8 @@ mesh and ``mu'`` on the richer one the error of ``mu'`` is at most ``rho |mu' - 
 (:mod:`rodfem.adaptivity.error_estimate`).  A mode that this leaves undecided is computed on a still richer mesh, unless
 it is within round-off on every one.  If an eigenvalue changes by more than itself all of the change is added.  One of
 another sign than on the mesh itself is undecided there, and so is one if the richer mesh has another state, by the
-strains of the two.
+strains of the two.  If the eigenvalues nearest zero do not explain the index of the richer mesh, the index is one of
+all between the two: what the mesh adds need not be small.
 
 What vanishes at a special point is zero there by construction, and undecided.  The special point of a richer mesh is at
 another load, so that its other eigenvalues are compared across the branch.
@@ -43,6 +44,8 @@ from rodfem.stability.near_zero import SPARE, NearZero, decide, near_zero, quoti
 from rodfem.stability.soft_mode import SoftMode, index_range
 
 FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
+FEW = 4
+"""Most eigenvalues that are judged one by one if the richer mesh has another index; the range of the index has all."""
 BARS = "richer meshes may decide that, ask for error bars"
 
 
@@ -57,6 +60,7 @@ class SoftStates:
         self.solver, self.names = solver, names_for(solver.system)
         self._richer, self._companions = richer, list[Enriched]()
         self.uncompared = ""
+        self._richer_index: int | None = None  # of the last state, if it is another one
 
     def examine(
         self,
@@ -74,7 +78,7 @@ class SoftStates:
         special point those of its ``vanishing`` null vectors.  Raises :class:`ConvergenceError` for a negative index.
         """
         metric = self.solver.system.metric
-        clear, self.uncompared = self._is_clear(point), ""
+        clear, self.uncompared, self._richer_index = self._is_clear(point), "", None
         # eigenvalues nearest zero to be judged, soft ones apart: those of another sign on the richer mesh
         least = self._differing(point, fixed_load) if compare and self._richer else 0
         if clear and not least:
@@ -89,6 +93,7 @@ class SoftStates:
             for i, mode in zip(others, refined, strict=True):
                 modes[i] = mode
         self._record(point, near, modes)
+        self._widen(point, modes)
         return bool(point.soft)
 
     def _small_eigenvalues(self, point: Point, least: int, family: bool) -> tuple[NearZero, list[PETSc.Vec]]:
@@ -114,18 +119,29 @@ class SoftStates:
                 f"The count of negative eigenvalues at load {point.load:.8g} gave {negative}: the constraints depend "
                 "on each other, or nearly; remove those that follow from the others."
             )
-        if point.negative_in_space is not None:  # that in the plane, and what is out of it
-            point.negative_in_space += negative - point.negative
-        point.negative, point.zero, point.undecided = negative, zero, undecided
+        _give_index(point, negative, undecided)
+        point.zero = zero
         limit = soft_limit(self.solver.inertia)
         point.soft = [m for m in modes if not m.decided or abs(m.value) < limit]
+
+    def _widen(self, point: Point, modes: list[SoftMode]) -> None:
+        """Leave the index of a ``point`` open as far as that of the richer mesh, if its ``modes`` do not explain that.
+
+        The one farthest from zero then has no bound of its error.
+        """
+        index, low, high = self._richer_index, point.negative, point.negative + point.undecided
+        if modes and index is not None and not low <= index <= high:
+            least = min(low, index)
+            _give_index(point, least, max(high, index) - least)
+            farthest = max(modes, key=lambda m: abs(m.value))
+            point.soft = [m for m in point.soft if m is not farthest] + [replace(farthest, uncertainty=inf)]
 
     def _is_clear(self, point: Point) -> bool:
         """Whether one factorisation told the index of a point, with a distance of the nearest eigenvalue from zero."""
         return bool(point.nearest or self.solver.regular.at(point.x))
 
     def _differing(self, point: Point, fixed_load: bool) -> int:
-        """Number of eigenvalues of another sign on the richer mesh, or zero there alone; 1 for a row it has not."""
+        """Number of eigenvalues to judge: of another sign on the richer mesh, or zero there; 1 for a row it has not."""
         with self.solver.system.clock.scope("error bars"):
             richer = self._companion(0)
             try:
@@ -137,11 +153,13 @@ class SoftStates:
                     self.uncompared = "" if again.resolved else again.unlike(point.load)
                     return int(self._moved(point, found) if again.resolved else not fixed_load)
                 index = decide(found).index
+                if again.resolved and not index.zero > found.drifts:
+                    self._richer_index = index.negative
             except ConvergenceError as trouble:  # no such state, or arithmetic leaves too many signs open there
                 self.uncompared = str(trouble)
                 return int(not fixed_load)
         own = point.zero - self.solver.system.active_drifts(point.x)
-        return max(abs(index.negative - point.negative), index.zero - found.drifts - own)
+        return min(max(abs(index.negative - point.negative), index.zero - found.drifts - own), FEW)
 
     def _moved(self, point: Point, there: Factored) -> bool:
         """Whether the eigenvalue nearest zero has another value at the same point on the richer mesh."""
@@ -188,6 +206,13 @@ class SoftStates:
             assert make is not None
             self._companions.append(make())
         return self._companions[level]
+
+
+def _give_index(point: Point, negative: int, undecided: int) -> None:
+    """Give a ``point`` another index, in space too: that in the plane, and what is out of it."""
+    if point.negative_in_space is not None:
+        point.negative_in_space += negative - point.negative
+    point.negative, point.undecided = negative, undecided
 
 
 def _rank(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], others: Sequence[PETSc.Vec]) -> list[int]:
@@ -327,15 +352,23 @@ def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
     """Whether a ``special`` point is the mesh's, by the ``rows``: on one side the next two are undecided.
 
     One is enough if the richer mesh has no such point, and none if the index is the same on both sides, as where two of
-    them are in one step.  Not if the decided indices on both sides differ by its own change, and as much is undecided:
-    that is another mode.
+    them are in one step.  Not if the indices on both sides differ whatever is undecided, or by its own change while as
+    much is undecided: that is another mode.
     """
     first = sum(p.arclength < special.point.arclength for p in rows)
     before, after, number = rows[:first][::-1], rows[first:], 2 if isfinite(special.error_estimate) else 1
     doubtful = any(sum(p.undecided > 0 for p in side[:number]) == number for side in (before, after))
     change = [(q.negative - p.negative, q.undecided - p.undecided) for p, q in zip(before[:1], after[:1], strict=False)]
     doubtful = doubtful or (number == 1 and change == [(0, 0)])
-    return special.kind.singular and doubtful and change != [(special.negative_after - special.negative_before, 0)]
+    (low, high), (least, most) = _bounds(before[:2]), _bounds(after[:2])
+    differ = high < least or most < low
+    own = special.negative_after - special.negative_before
+    return special.kind.singular and doubtful and not differ and change != [(own, 0)]
+
+
+def _bounds(rows: Sequence[Point]) -> tuple[float, float]:
+    """Greatest of the lower bounds of the index at some ``rows``, and least of the upper ones."""
+    return max((p.negative for p in rows), default=0), min((p.negative + p.undecided for p in rows), default=inf)
 
 
 def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:

@@ -110,7 +110,6 @@ class Tracer:
             try:
                 self.control.row(history[-1], self.solver)
                 if not begun:
-                    self._say_unstable(branch)
                     self._first_specials(branch)
                 begun = True
                 while not self._advance(branch, history):  # each time from where it has gone back to
@@ -168,10 +167,10 @@ class Tracer:
         return True
 
     def _say_unstable(self, branch: Branch) -> None:
-        """Say of the first branch that it begins unstable, on the mesh that it goes on with."""
+        """Say of the first branch that it begins unstable, as far as richer meshes have not left that open."""
         point = branch.points[0]
         if self.branches and branch is self.branches[0] and point.negative:
-            index = index_range(point.negative, point.zero - self.solver.system.active_drifts(point.x))
+            index = index_range(point.negative, point.undecided)
             words = f"  the first state is unstable already (index {index}): stability was lost outside the range"
             self.observer.note(Remark(words, point.load))
 
@@ -346,6 +345,7 @@ class Tracer:
             self._error_bars(branch)
             merge_doubles(branch)
         self._soft_modes(branch)
+        self._say_unstable(branch)
         self.quadrature.examine(branch)
         branch.image = image_of(branch, self.solver)
         changes = (Remark(str(change), change.a.load, change.b.load) for change in branch.unexplained)

@@ -10,9 +10,7 @@ import inspect
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from importlib.machinery import EXTENSION_SUFFIXES
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -45,24 +43,16 @@ def _cached(module_name: str, object_names: Sequence[str], cache_dir: str | Path
     """Objects of a module of FFCx's cache, and the module; without listing its folder, which takes 10 ms."""
     files = (Path(cache_dir) / f"{module_name}{end}" for end in EXTENSION_SUFFIXES)
     file = next((f for f in files if f.is_file()), None)
-    if file is None or not (Path(cache_dir) / f"{module_name}.c.cached").is_file():
+    whole = file is not None and (Path(cache_dir) / f"{module_name}.c.cached").is_file()
+    module = code_cache.load(module_name, file) if file and whole else None
+    if module is None:
         try:
             Path(cache_dir).mkdir(parents=True, exist_ok=True)
             (Path(cache_dir) / f"{module_name}.c").touch()  # FFCx renames it if it fails
         except OSError as error:
             raise SetupError(code_cache.refused(error)) from error
         return None, None
-    module = _loaded(module_name, file)
     return [getattr(module.lib, name) for name in object_names], module
-
-
-@cache
-def _loaded(name: str, file: Path) -> Any:
-    spec = spec_from_file_location(name, file)
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def _compile(*arguments: Any, **options: Any) -> Any:
@@ -107,6 +97,8 @@ def _from_cache(comm: MPI.Comm) -> Iterator[None]:
         yield
     except OSError as error:
         raise SetupError(code_cache.refused(error)) from error
+    except ImportError as error:
+        raise SetupError(code_cache.UNLOADABLE.format(code_cache.folder())) from error
     except (AttributeError, RuntimeError) as trouble:
         together = comm.size > 1 and isinstance(trouble, RuntimeError) and TOGETHER.match(str(trouble))
         why = comm.bcast(str(trouble)) if together else str(trouble)

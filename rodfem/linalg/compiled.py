@@ -80,11 +80,10 @@ def buffer(ffi: Any, values: np.ndarray) -> Any:
 @cache
 def module(name: str) -> Any:
     """The compiled module of the file ``name.c`` in the package, with ``lib`` and ``ffi`` of cffi."""
-    found = _library(name) or _compile(name)
-    spec = importlib.util.spec_from_file_location(_full_name(name), found)
-    assert spec is not None and spec.loader is not None
-    out = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(out)
+    full, found = _full_name(name), _library(name)
+    out = (code_cache.load(full, found) if found else None) or code_cache.load(full, _compile(name))
+    if out is None:
+        raise SetupError(code_cache.UNLOADABLE.format(code_cache.folder()))
     return out
 
 

@@ -11,7 +11,7 @@ import pytest
 from ffcx.codegeneration import jit
 from hard.test_environments import form
 
-from rodfem import compat
+from rodfem import code_cache, compat
 from rodfem.linalg import compiled
 
 pytestmark = pytest.mark.versions
@@ -37,7 +37,11 @@ def test_a_module_exports_its_init_function_alone(name: str) -> None:
 def test_so_do_those_of_forms(tmp_path: Path) -> None:
     jit.compile_forms([form()], cache_dir=tmp_path, **next(iter(compat.C_COMPILER.values())))
     (made,) = (file for file in tmp_path.iterdir() if file.suffix == ".so")
-    assert exported(made) == [f"PyInit_{made.name.partition('.')[0]}"]
+    name = made.name.partition(".")[0]
+    assert exported(made) == [f"PyInit_{name}"]
+    damaged = tmp_path / f"damaged{made.suffix}"
+    damaged.write_bytes(made.read_bytes()[:99])
+    assert code_cache.load(name, damaged) is None and not damaged.exists()  # so that it is compiled anew
 
 
 def test_memory_keeps_what_a_pointer_points_to() -> None:

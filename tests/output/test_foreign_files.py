@@ -200,3 +200,15 @@ def test_links_out_of_a_folder(bad: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"), locked(bad, MPI.COMM_SELF):
         pass
     assert mine.read_text() == "mine"
+
+
+@pytest.mark.few(1)
+def test_terminal_obeys_no_text_of_a_file(bad: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = json.loads((bad / "diagram.json").read_text())
+    data["title"], data["scene"] = "\x1b]0;mine\x07 \\u001b \\", "\x1b[2J\x9b"
+    (bad / "diagram.json").write_text(json.dumps(data))
+    console.main(["info", str(bad)])
+    console.main(["list", str(bad)])
+    shown = capsys.readouterr().out
+    assert "]0;mine" in shown and r"\u001b \: " in shown  # six characters and a backslash are what they are
+    assert all(c.isprintable() or c == "\n" for c in shown)
