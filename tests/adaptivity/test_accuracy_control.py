@@ -43,17 +43,6 @@ def claimed(branches: list[Branch]) -> float:
     return max(rows)
 
 
-@pytest.mark.long
-@ACCURACIES
-def test_cord(accuracy: float) -> None:
-    found = explored(demo_cases.scene("cord"), accuracy, at=(40.0,))
-    errors = np.subtract([load for load, _ in special(found, "straight", BRANCH_POINT)], CORD["points"])
-    assert abs(errors / CORD["points"]).max() < accuracy
-    assert abs(special(found, "branch 2", FOLD)[0][0] - CORD["fold"]) / CORD["fold"] < accuracy
-    assert abs(special(found, "branch 1", USER)[0][1] - CORD["shortening"]) < accuracy
-    assert claimed(found.branches) <= accuracy
-
-
 @pytest.mark.parametrize("accuracy", [1e-8, *(pytest.param(a, marks=pytest.mark.long) for a in (1e-4, 1e-6, 1e-10))])
 def test_hemitropic(accuracy: float) -> None:
     found = explored(hemitropic_cases.scene(), accuracy, at=(0.5,))

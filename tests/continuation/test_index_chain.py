@@ -3,7 +3,6 @@
 from dataclasses import replace
 from math import cos, pi, sin, sqrt
 
-import demo_cases
 import golden_cases
 import hemitropic_cases
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from classics import ON_AXIS, RIGID, column, explore, push
 from closed_form_hemitropic import loads as buckling_loads
 from hard.two_freedoms import scene as two_freedoms
-from rows import verify
 
 from rodfem import (
     Discretization,
@@ -29,7 +27,6 @@ from rodfem import (
 from rodfem.continuation.branch import breaks, merge_doubles
 from rodfem.continuation.follow import follow
 from rodfem.continuation.kinds import BRANCH_POINT
-from rodfem.diagram import explorer
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.table import branch_data
 
@@ -155,16 +152,6 @@ def test_a_pair_of_crossings_that_no_parabola_shows(slope: float, largest: float
     found = [s for s in branch.special if s.kind == BRANCH_POINT]
     assert [(s.negative_before, s.negative_after) for s in found] == [(0, 1), (1, 0)]
     assert [s.point.load for s in found] == pytest.approx([-apart / 2, apart / 2], abs=1e-10)
-
-
-@pytest.mark.long
-def test_every_row_of_the_ring_demo(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its branch comes back to where it ends, which its last rows tell, however short their steps are."""
-    monkeypatch.setattr(explorer, "TAIL", 1)
-    scene = demo_cases.scene("ring")
-    diagram = trace(scene, Discretization("auto", 8, 6), Plan(error_bars=False))
-    verify(diagram.solvers[0], diagram.branches)
-    assert [b.name for b in diagram] == ["circle", "branch 1", "branch 1.1", "branch 1.2"]
 
 
 def test_what_is_not_explained_is_kept() -> None:

@@ -64,38 +64,6 @@ def test_near_singular_states_are_left_to_others(name: str) -> None:
 
 
 @pytest.mark.ranks
-def test_nearest_eigenvalue_of_the_straight_cord_is_estimated() -> None:
-    """Straight cord in tension: S is singular at 49.348 only, and its eigenvalues are smooth in between."""
-    follower, branches = demo("cord", "reduced")
-    straight = branches[0].points
-    seen = []
-    follower.regular.restart()
-    for point in straight[1:20]:
-        follower.system.set_phase(point.x)
-        special = any(s.point is point for s in branches[0].special)
-        if not special and (regular := follower.regular.at(point.x)):
-            factored = follower.inertia.at(point.x)
-            factored.count()
-            exact = abs(factored.nearest(1, accuracy=1e-6)[0][0])
-            assert regular.index.nearest > (1 - 1e-6) * exact  # an upper bound
-            seen.append(regular.index.nearest / exact)
-    assert len(seen) > 5
-    assert np.median(seen) < 1.5
-
-
-def test_a_mode_next_to_a_pitchfork_is_found_by_one_factorisation() -> None:
-    """The bent cord: its eigenvalue, 1e-4 of bending, rises with the square of the distance from the branch point."""
-    follower, branches = demo("cord", "reduced")
-    points = next(b for b in branches if b.name == "branch 1").points[1:3]
-    values = []
-    for point in points:
-        follower.regular.restart()
-        values.append(follower.regular.at(point.x).index.nearest)
-    assert max(values) < 1e-3 * follower.inertia.scale
-    assert values[1] / values[0] == pytest.approx((points[1].arclength / points[0].arclength) ** 2, rel=0.05)
-
-
-@pytest.mark.ranks
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_conditions_of_a_state_met_again_are_its_own(formulation: str) -> None:
     """In whatever order rows are asked for, the phase conditions are those that are found anew."""

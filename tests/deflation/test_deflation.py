@@ -12,12 +12,10 @@ from demo_cases import Found, explored, scene
 from rescaled import DNA, rescaled
 from shooting_solver import Problem, Rod
 
-from rodfem import Branch, Discretization, InputError, Observer, Plan, Point, Solver, pinned, trace
+from rodfem import Discretization, InputError, Plan, Point, Solver, pinned, trace
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.deflation.search import NEW, Deflation, equilibria_at, turned_state
-from rodfem.deflation.symmetries import Orbit, mirrors
-from rodfem.diagram.explorer import Explorer
-from rodfem.tolerances import APART
+from rodfem.deflation.symmetries import mirrors
 
 K0 = 3 * pi
 CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
@@ -69,25 +67,6 @@ def test_cord() -> None:
 
 
 @pytest.mark.long
-def test_hemitropic() -> None:
-    """A circle of states counts as one, and the states are those of the branches."""
-    follower = hemitropic_cases.follower()
-    branches = hemitropic_cases.explored(at=(0.35,), depth=1)
-    search = Deflation(follower, 0.35)
-    new = search.run(24)
-    for name in ("straight", "branch 1", "branch 2"):
-        (branch,) = [b for b in branches if b.name == name]
-        for p in hemitropic_cases.user_points(branch, 0.35):
-            match = only(new, energy=p.energy, ordinate=p.ordinate)
-            assert (match.negative, match.zero) == (p.negative, p.zero)
-            orbit = Orbit(follower.system, match.x, 0)
-            for angle in (0.7, 2.5, 4.0):  # all of the circle is known, and in equilibrium
-                x = orbit.at(angle)
-                assert search.known.distance(x) < 1e-9
-                assert force(follower, x) < 1e-9
-
-
-@pytest.mark.long
 def test_ring_in_its_plane() -> None:
     """Moved, turned, or run around along itself it is the same ring: a circle, and beyond 3 the pressed one."""
     follower = Solver(classics.pressed_ring(), Discretization("auto", 12, 6)).equilibria
@@ -96,44 +75,6 @@ def test_ring_in_its_plane() -> None:
     circle, pressed = sorted(found, key=lambda p: -p.negative)
     assert circle.energy == pytest.approx(np.pi, rel=1e-9)
     assert (circle.zero, pressed.zero) == (3, 4)  # two translations, a rotation; and the shift, which a circle turns by
-
-
-def both_ways(point: Point) -> list[Branch]:
-    """Branches of one point each that set out from it to higher and to lower loads."""
-    assert point.tangent is not None
-    out = []
-    for sign in (1.0, -1.0):
-        tangent = point.tangent.copy()
-        tangent.scale(sign if point.slope >= 0 else -sign)
-        first = replace(point, tangent=tangent, arclength=0.0, slope=sign * abs(point.slope))
-        out.append(Branch("found", None, 0, [first]))
-    return out
-
-
-@pytest.mark.long
-def test_ruler() -> None:
-    """Both ways of falling to the side count as one; it is the start of the branch that leaves the plane."""
-    found = ruler()
-    (plane,) = hemitropic_cases.user_points(found["plane"], 6.0)
-    search = Deflation(found.follower, 6.0, [plane])
-    (buckled,) = search.run(24)
-    (p,) = hemitropic_cases.user_points(found["branch 1"], 6.0)
-    assert (buckled.energy, buckled.ordinate) == pytest.approx((p.energy, p.ordinate), abs=1e-10)
-    assert (buckled.negative, buckled.zero, plane.negative) == (0, 0, 1)
-    (mirror,) = search.mirrors
-    image = mirror(found.follower.shape, buckled.x)
-    assert found.follower.system.distance(image, buckled.x) > 0.5
-    assert force(found.follower, image) < 1e-9
-    assert search.known.distance(image) < APART
-
-    explorer = Explorer(found.follower, Plan((0.0, 12.0), error_bars=False), Observer(), lambda: None)
-    up, down = both_ways(buckled)
-    for branch in (up, down):
-        explorer.trace(branch)
-    assert up.ended == "end of range"
-    assert up.points[-1].ordinate == pytest.approx(found["branch 1"].points[-1].ordinate, abs=1e-9)
-    assert down.ended.startswith("meets another branch")
-    assert down.points[-1].load == pytest.approx(4.42594840243, abs=1e-9)
 
 
 @pytest.mark.few(1)
