@@ -11,7 +11,6 @@ import sys
 from pathlib import Path
 
 from . import worker
-from .summary import in_words
 
 LIMIT = 300.0
 """Seconds of a scene."""
@@ -29,19 +28,16 @@ def main() -> None:
     parser.add_argument("--output", type=Path)
     parser.add_argument("--only", type=int, help="number of the only scene, in this process")
     parser.add_argument("--summary", type=Path, nargs="+", metavar="FILE")
-    parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)  # what the children are given
     given = parser.parse_args()
-    if given.work:
-        worker.work(given.seed, given.depth)
-    elif given.summary:
-        print(in_words([json.loads(line) for file in given.summary for line in file.read_text().splitlines()]))
+    if given.summary:
+        print(worker.in_words([json.loads(line) for file in given.summary for line in file.read_text().splitlines()]))
     elif given.only is not None:
         print(json.dumps(worker.examine(given.seed, given.only, given.depth), indent=1))
     else:
         file = given.output or Path("results") / f"fuzz-{given.seed}.jsonl"
         file.parent.mkdir(parents=True, exist_ok=True)
         entries = worker.run(file, given.seed, given.scenes, given.depth, given.limit)
-        print(in_words(entries))
+        print(worker.in_words(entries))
         sys.exit(any(worker.is_fault(entry) for entry in entries))
 
 

@@ -1,12 +1,11 @@
-"""Scenes one by one in a child process, and a line of results for each."""
+"""Scenes one by one in a child process, a line of results for each, and all in a few lines."""
 
 import json
-import os
-import select
-import subprocess
-import sys
 import time
 import traceback
+from collections import Counter
+from collections.abc import Sequence
+from multiprocessing import TimeoutError, get_context
 from pathlib import Path
 from typing import Any
 
@@ -37,73 +36,57 @@ def examine(seed: int, number: int, depth: int = 1) -> Entry:
     return entry | found.entry() | {"outcome": outcome}
 
 
-def work(seed: int, depth: int) -> None:
-    """Child process: a number a line comes in, an entry a line goes out."""
-    out = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # whatever prints besides must not be taken for an entry
-    for line in sys.stdin:
-        out.write(json.dumps(examine(seed, int(line), depth)) + "\n")
-        out.flush()
-
-
-class Child:
-    """A child process that examines scenes of a seed."""
-
-    def __init__(self, seed: int, depth: int, errors: Path) -> None:
-        command = [sys.executable, "-m", "tests.hard.fuzz", "--work", "--seed", str(seed), "--depth", str(depth)]
-        with errors.open("a") as file:
-            self.process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=file, text=True, start_new_session=True
-            )
-        self.done = 0
-
-    def ask(self, seed: int, number: int, limit: float) -> Entry:
-        """Entry of a scene, also where the child hangs or dies."""
-        process, nobody = self.process, {"seed": seed, "number": number}
-        assert process.stdin is not None and process.stdout is not None
-        try:
-            process.stdin.write(f"{number}\n")
-            process.stdin.flush()
-        except BrokenPipeError:
-            return nobody | {"outcome": CRASHED, "trace": [f"ended with {process.wait()}"]}
-        ready, _, _ = select.select([process.stdout], [], [], limit)
-        if not ready:
-            return nobody | {"outcome": HUNG, "trace": [f"no answer within {limit:g} s"]}
-        line = process.stdout.readline()
-        self.done += 1
-        return json.loads(line) if line else nobody | {"outcome": CRASHED, "trace": [f"ended with {process.wait()}"]}
-
-    def end(self) -> None:
-        """End it."""
-        self.process.kill()
-        self.process.wait()
-
-
 def run(file: Path, seed: int, scenes: int, depth: int, limit: float) -> list[Entry]:
     """Entries of scenes 0 to ``scenes``: those of the file, and the others, which are added to it."""
     known = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
     entries = {entry["number"]: entry for entry in known if entry["seed"] == seed}
-    child = None
-    try:
-        for number in (n for n in range(scenes) if n not in entries):
-            began, child = time.time(), child or Child(seed, depth, file.with_suffix(".err"))
-            entry = child.ask(seed, number, limit) | {"seconds": round(time.time() - began, 1)}
-            entries[number] = entry
-            with file.open("a") as results:
-                results.write(json.dumps(entry) + "\n")
-            if is_fault(entry):
-                print(
-                    f"{number}: {entry['outcome']}: {entry.get('wrong') or entry.get('differs') or entry}", flush=True
-                )
-            if entry["outcome"] in (CRASHED, HUNG) or child.done >= RENEWED:
-                child.end()
-                child = None
-    finally:
-        if child is not None:
-            child.end()
+    spawning = get_context("spawn")
+    pool = spawning.Pool(1, maxtasksperchild=RENEWED)
+    for number in (n for n in range(scenes) if n not in entries):
+        began = time.time()
+        try:
+            entry = pool.apply_async(examine, (seed, number, depth)).get(limit)
+        except TimeoutError:  # it hangs, or has died
+            entry = {"seed": seed, "number": number, "outcome": HUNG, "trace": [f"no answer within {limit:g} s"]}
+            pool.terminate()
+            pool = spawning.Pool(1, maxtasksperchild=RENEWED)
+        entries[number] = entry = entry | {"seconds": round(time.time() - began, 1)}
+        with file.open("a") as results:
+            results.write(json.dumps(entry) + "\n")
+        if is_fault(entry):
+            print(f"{number}: {entry['outcome']}: {entry.get('wrong') or entry.get('differs') or entry}", flush=True)
+    pool.terminate()
     return [entries[n] for n in sorted(entries) if n < scenes]
 
 
 def is_fault(entry: Entry) -> bool:
     """Whether a scene shows what it must not: a crash, a hang, a wrong index, a difference of which nothing is said."""
     return entry["outcome"] in (CRASHED, HUNG) or bool(entry.get("wrong")) or bool(entry.get("silent"))
+
+
+def in_words(entries: Sequence[Entry]) -> str:
+    """Numbers of scenes, rows, special points, and how well error bars hold."""
+    outcomes = Counter(entry["outcome"] for entry in entries)
+    rows, unclear = (sum(entry.get(name, 0) for entry in entries) for name in ("rows", "unclear"))
+    ratios = sorted(ratio for entry in entries for ratio in entry.get("ratios", ()))
+    within = sum(ratio <= 1 for ratio in ratios)
+    wrong = [e for e in entries if e.get("wrong")]
+    differ = [e for e in entries if e.get("differs")]
+    lines = [
+        f"{len(entries)} scenes: " + ", ".join(f"{count} {name}" for name, count in outcomes.most_common()),
+        f"{rows} rows counted densely ({unclear} too near a critical state), {len(wrong)} scenes with wrong ones",
+        f"{len(ratios)} pairs of special points, {sum(e.get('unresolved', 0) for e in entries)} of which a mesh says "
+        "that it does not resolve them besides",
+        f"{len(differ)} scenes differ, {sum(bool(e.get('silent')) for e in differ)} of them without a word",
+    ]
+    if ratios:
+        share = within / len(ratios)
+        lines.append(
+            f"{share:.2%} are within the sum of their bars; the largest ratios: "
+            + ", ".join(f"{ratio:.3g}" for ratio in ratios[:-6:-1])
+        )
+    for entry in entries:
+        for name in ("wrong", "differs", "trace"):
+            if entry.get(name) and (name != "differs" or entry.get("silent")):
+                lines.append(f"  seed {entry['seed']}, scene {entry['number']}: {name}: {entry[name][-1]}")
+    return "\n".join(lines)
