@@ -15,12 +15,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, pairwise
+from typing import Any
 from warnings import catch_warnings, filterwarnings
 
 import numpy as np
 
 from rodfem.codim2.neighbours import Neighbours, losses
-from rodfem.diagram.diagram import MESH, PLAN, Diagram, trace
+from rodfem.diagram.diagram import Diagram, trace
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import SCENE
 from rodfem.errors import ConvergenceError, InputError
@@ -70,37 +71,41 @@ class Design:
         return f"<Design: first loss at {self.load:.8g}, {self.message}>"
 
 
-@checked(scene=SCENE, plan=PLAN, discretization=MESH)
+@checked(scene=SCENE)
 def design(
     scene: Scene,
     fields: Mapping[str, Field],
     maximise: str | Loads = FIRST_LOSS,
-    plan: Plan | None = None,
-    discretization: Discretization | None = None,
+    subject_to: Sequence[Any] = (),
+    **of_trace: Any,
 ) -> Design:
     """Fields in the place of constants of a ``scene`` for which its first branch stays stable longest.
 
     ``fields`` are :class:`~rodfem.Field` by the name of the constant, as in ``{"A": Field(9, bounds=(0.1, 3.0),
     mean=1.0)}``: numbers along the rod with bounds, and a mean, where a volume is given.  ``maximise`` is the "first
     loss", or a function of the first critical loads (k,), in order, as ``lambda P: -(P[0] - 5.0) ** 2`` for a rod that
-    buckles at 5.  Three loads take part at which the index of the first branch grows, or as many as there are in the
-    range of the scene, or of the ``plan``.  By default the ``discretization`` has two elements for each number.  Raises
-    :class:`~rodfem.errors.InputError` for what is no constant, or no critical load in the range, and
-    :class:`~rodfem.errors.ConvergenceError` where the loads are lost on the way.
+    buckles, or snaps, at 5.  Three loads take part at which the index of the first branch grows, or as many as there
+    are in the range of the scene, or of the plan, up to the first fold.  ``subject_to`` has functions of these loads
+    that are not to be negative, as ``lambda P: P[1] - 1.2 * P[0]``, and scipy's ``LinearConstraint`` or
+    ``NonlinearConstraint`` on the numbers of all fields, in order.  ``of_trace`` are ``plan`` and ``discretization``
+    of :func:`~rodfem.trace`, by default with two elements for each number.  Raises :class:`~rodfem.errors.InputError` for what
+    is no constant, or no critical load in the range, and :class:`~rodfem.errors.ConvergenceError` where the loads are
+    lost on the way.
     """
     _check(fields, maximise)
-    mesh = discretization or Discretization(elements=max(8, *(2 * field.pieces for field in fields.values())))
-    search, reached = _Search(with_fields(scene, fields), dict(fields), maximise), -np.inf
-    plan = plan or Plan(depth=0)
+    mesh = Discretization(elements=max(8, *(2 * field.pieces for field in fields.values())))
+    how = dict[str, Any](discretization=mesh, plan=Plan(depth=0)) | of_trace
+    plan, search = how["plan"], _Search(with_fields(scene, fields), dict(fields), maximise, subject_to)
+    reached = -np.inf
     for _ in range(ROUNDS):
-        points = losses(trace(search.rod, mesh, replace(plan, error_bars=False))[0], LOADS)
+        points = losses(trace(search.rod, **how | {"plan": replace(plan, error_bars=False)})[0], LOADS)
         if not points:
             low, high = plan.load_range(scene)
             raise InputError(f"The first branch loses no stability from {low:g} to {high:g}: give a wider range.")
         if search.aim(np.array([special.point.load for special in points])) >= reached - SAME * abs(reached) > -np.inf:
             break
         reached = search.run(Neighbours(points))
-    return search.answer(trace(search.rod, mesh, replace(plan, error_bars=True)))
+    return search.answer(trace(search.rod, **how | {"plan": replace(plan, error_bars=True)}))
 
 
 def _check(fields: Mapping[str, Field], maximise: str | Loads) -> None:
@@ -114,8 +119,11 @@ def _check(fields: Mapping[str, Field], maximise: str | Loads) -> None:
 class _Search:
     """Numbers of the fields of a scene, and how an optimiser changes them."""
 
-    def __init__(self, scene: Scene, fields: dict[str, Field], maximise: str | Loads) -> None:
+    def __init__(
+        self, scene: Scene, fields: dict[str, Field], maximise: str | Loads, subject_to: Sequence[Any]
+    ) -> None:
         self.scene, self.fields, self.reached, self.message = scene, fields, False, ""
+        self.subject_to = subject_to
         self.bound = maximise == FIRST_LOSS
         self.aim: Loads = (lambda loads: float(loads.min())) if self.bound else maximise  # type: ignore[assignment]
         own = [names(name, field) for name, field in fields.items()]
@@ -171,8 +179,11 @@ class _Search:
                 method="SLSQP",
                 bounds=[*zip(low, high, strict=True), *[(None, None)] * extra],
                 constraints=[
-                    {"type": kind, "fun": lambda z, of=of: held(z)[0][of], "jac": lambda z, of=of: held(z)[1][of]}
-                    for kind, of in (("ineq", slice(k)), ("eq", slice(k, None)))
+                    *(
+                        {"type": kind, "fun": lambda z, of=of: held(z)[0][of], "jac": lambda z, of=of: held(z)[1][of]}
+                        for kind, of in (("ineq", slice(k)), ("eq", slice(k, None)))
+                    ),
+                    *(self._asked(near, size, each) for each in self.subject_to),
                 ],
                 options={"maxiter": 200, "ftol": SAME**1.5},
             )
@@ -188,10 +199,27 @@ class _Search:
         n = len(self.names)
         if self.bound:
             return -float(z[n]), -np.eye(n + 1)[n]
-        loads, slopes = self._loads(near, z)
+        value, row = self._of_loads(near, size, self.aim, z)
+        return -value, -row
+
+    def _of_loads(self, near: Neighbours, size: float, of: Loads, z: np.ndarray) -> tuple[float, np.ndarray]:
+        """A person's function of the loads, and its derivatives in all unknowns."""
+        loads, slopes = self._loads(near, z[: len(self.names)])
         steps = SAME * size * np.eye(len(loads))
-        parts = [(self.aim(loads + step) - self.aim(loads - step)) / (2 * step.max()) for step in steps]
-        return -self.aim(loads), -np.array(parts) @ slopes
+        parts = [(of(loads + step) - of(loads - step)) / (2 * step.max()) for step in steps]
+        return float(of(loads)), np.append(np.array(parts) @ slopes, np.zeros(len(z) - len(self.names)))
+
+    def _asked(self, near: Neighbours, size: float, asked: Any) -> Any:
+        """One of the conditions of a person, as scipy takes it."""
+        from scipy.optimize import LinearConstraint, NonlinearConstraint
+
+        n = len(self.names)
+        if isinstance(asked, LinearConstraint):
+            return NonlinearConstraint(lambda z: asked.A @ z[:n], asked.lb, asked.ub)
+        if isinstance(asked, NonlinearConstraint):
+            return NonlinearConstraint(lambda z: asked.fun(z[:n]), asked.lb, asked.ub)
+        value = partial(self._of_loads, near, size, asked)
+        return {"type": "ineq", "fun": lambda z: value(z)[0] / size, "jac": lambda z: value(z)[1] / size}
 
     def _held(self, near: Neighbours, size: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What is not negative, loads over ``t``, and then what is zero, means of fields; and their derivatives."""

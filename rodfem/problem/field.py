@@ -17,7 +17,7 @@ import numpy as np
 import ufl
 
 from rodfem.errors import InputError
-from rodfem.problem.arguments import a, convert, interval, optional, real, whole, yes_or_no
+from rodfem.problem.arguments import a, convert, interval, optional, real, reals, whole, yes_or_no
 from rodfem.problem.functions import Role, changes
 from rodfem.problem.scene import Parameter, Scene
 
@@ -34,6 +34,7 @@ class Field:
     at both ends, and amplitudes of ``sin j pi s``.  A ``symmetric`` one is so about the middle of the rod.  Numbers are
     within the ``bounds``.  The ``mean`` along the rod of the field, or of its ``power``, is given, where there is one:
     a volume, of the first power of an area, and of the power 1/2 of the bending stiffness of similar cross-sections.
+    The field begins with the numbers ``first``, else uniform.
     """
 
     numbers: int = 9
@@ -42,14 +43,19 @@ class Field:
     mean: float | None = None
     power: float = 1.0
     symmetric: bool = False
+    first: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise :class:`InputError` for another kind."""
         word = a(str, f"one of {', '.join(KINDS)}")
         convert(self, numbers=whole(9, 2), kind=word, bounds=interval(0.1, 3.0, real))
         convert(self, mean=optional(real(1.0)), power=real(0.5), symmetric=yes_or_no)
+        convert(self, first=lambda name, given: tuple(reals(name, given, (1.0, 0.5))))
         if self.kind not in KINDS:
             raise InputError(f"A field has the kind {self.kind!r}: choose one of {', '.join(KINDS)}.")
+        count = len(self.functions(0.5))
+        if len(self.first) not in (0, count):
+            raise InputError(f"A field of {count} numbers begins with {len(self.first)}: give {count}, or none.")
 
     @property
     def pieces(self) -> int:
@@ -95,11 +101,12 @@ class Field:
         return float(weights @ values**self.power), self.power * (weights * values ** (self.power - 1)) @ table
 
     def parameters(self, name: str, constant: Parameter) -> dict[str, Parameter]:
-        """Numbers of a uniform field in the place of a ``constant``, which has the mean if one is given."""
+        """First numbers of the field in the place of a ``constant``: uniform ones have the mean that is given."""
         value = constant.value if self.mean is None else self.mean ** (1.0 / self.power)
         waves, admissible = self.kind == SINES, (-inf, inf) if self.kind == SINES else constant.admissible
-        each = enumerate(names(name, self))
-        return {n: Parameter(0.0 if i and waves else value, admissible=admissible) for i, n in each}
+        own = names(name, self)
+        first = self.first or [0.0 if i and waves else value for i in range(len(own))]
+        return {n: Parameter(x, admissible=admissible) for n, x in zip(own, first, strict=True)}
 
 
 def names(constant: str, field: Field) -> list[str]:
