@@ -87,10 +87,10 @@ def design(
     buckles, or snaps, at 5.  Three loads take part at which the index of the first branch grows, or as many as there
     are in the range of the scene, or of the plan, up to the first fold.  ``subject_to`` has functions of these loads
     that are not to be negative, as ``lambda P: P[1] - 1.2 * P[0]``, and scipy's ``LinearConstraint`` or
-    ``NonlinearConstraint`` on the numbers of all fields, in order.  ``of_trace`` are ``plan`` and ``discretization``
-    of :func:`~rodfem.trace`, by default with two elements for each number.  Raises :class:`~rodfem.errors.InputError` for what
-    is no constant, or no critical load in the range, and :class:`~rodfem.errors.ConvergenceError` where the loads are
-    lost on the way.
+    ``NonlinearConstraint`` on the numbers of all fields, in order.  ``of_trace`` are ``plan`` and ``discretization`` of
+    :func:`~rodfem.trace`, by default with two elements for each number.  Raises :class:`~rodfem.errors.InputError` for
+    what is no constant, or no critical load in the range, and :class:`~rodfem.errors.ConvergenceError` where the loads
+    are lost on the way.
     """
     _check(fields, maximise)
     mesh = Discretization(elements=max(8, *(2 * field.pieces for field in fields.values())))
