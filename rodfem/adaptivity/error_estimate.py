@@ -294,10 +294,14 @@ def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:
         return None
 
 
+def located(solver: BranchSolver, last: Point) -> float:
+    """Uncertainty of the load of the ``last`` admissible point on one mesh."""
+    return LOCATED * unit(last.load, one=solver.units.load)
+
+
 def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) -> SpecialPoint:
     """The end at the ``last`` admissible point, sharpened where ``error_bars`` are asked for, or a note why not."""
-    located = LOCATED * unit(last.load, one=solver.units.load)
-    end = SpecialPoint(END, last, last.negative, last.negative, located, test_function="stretch")
+    end = SpecialPoint(END, last, last.negative, last.negative, located(solver, last), test_function="stretch")
     if error_bars:
         try:
             with solver.system.clock.scope("error bars"):
@@ -320,7 +324,7 @@ def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
         sample = fine.shape.sample(x)
     before, point = found
     end.point = replace(point, x=solver.shape.restore(sample))
-    end.located_to = LOCATED * unit(point.load, one=solver.units.load)
+    end.located_to = located(solver, point)
     left = 1.0 if d.degree == 1 else 0.25
     end.error_estimate = max(left * abs(point.load - before.load), end.located_to)
     end.ordinate_error = max(left * abs(point.ordinate - before.ordinate), end.located_to)

@@ -10,7 +10,7 @@ from numbers import Integral
 from operator import attrgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 from uuid import uuid4
 
 from mpi4py import MPI
@@ -95,8 +95,16 @@ class Diagram:
     def __iter__(self) -> Iterator[Branch]:
         return iter(self.branches)
 
-    def __getitem__(self, key: str | int) -> Branch:
-        """Branch by name or number; raises :class:`KeyError` or :class:`IndexError`."""
+    @overload
+    def __getitem__(self, key: str | int) -> Branch: ...
+
+    @overload
+    def __getitem__(self, key: slice) -> list[Branch]: ...
+
+    def __getitem__(self, key: str | int | slice) -> Branch | list[Branch]:
+        """Branch by name or number, or several as of a list; raises :class:`KeyError` or :class:`IndexError`."""
+        if isinstance(key, slice):
+            return self.branches[key]
         if isinstance(key, Integral):
             return self.branches[int(key)]
         for branch in self.branches:

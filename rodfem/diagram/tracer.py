@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from math import isnan
 from typing import NoReturn
 
-from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible
+from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible, located
 from rodfem.adaptivity.mesh_sequence import AccuracyControl, Meshes, TooCoarse, interpolated
 from rodfem.adaptivity.soft_states import SoftRows
 from rodfem.continuation.arc import Arc
@@ -200,10 +200,18 @@ class Tracer:
         branch.append(row)
         self.observer.progress(branch, row)
 
-    def _add_special_points(self, branch: Branch, a: Point, b: Point, *, closed: bool = False) -> None:
-        """Insert special points between two points, the second maybe where the branch began."""
+    def _add_special_points(
+        self, branch: Branch, a: Point, b: Point, *, closed: bool = False, end: bool = False
+    ) -> None:
+        """Insert special points between two points, the second maybe where the branch began, or without stretch.
+
+        At such an ``end`` eigenvalues vanish, which is no special point of its own.
+        """
         with self.solver.system.clock.scope("location"):
             specials = [] if a is branch.points[0] and branch.parent else self.specials.advance(b)
+            if end:
+                close = located(self.solver, b)
+                specials = [s for s in specials if abs(s.point.load - b.load) > close]
             self._leave(branch, specials, b)
             step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
             self._insert(branch, specials + self._requests(step))
@@ -277,7 +285,7 @@ class Tracer:
                 self._add_special_points(branch, a, near)
                 branch.append(near)
                 a = near
-        self._add_special_points(branch, a, last)
+        self._add_special_points(branch, a, last, end=True)
         end = end_at_zero_stretch(self.solver, last, error_bars=self.plan.error_bars)
         if not isnan(end.error_estimate):
             self.control.check(end)

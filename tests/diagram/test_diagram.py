@@ -34,7 +34,7 @@ def test_nothing_is_printed_and_no_file_is_written(
 @pytest.mark.ranks
 def test_branches_and_special_points(diagram: Diagram) -> None:
     assert [b.name for b in diagram] == ["straight", "branch 1", "branch 2"][: len(diagram)]
-    assert diagram["straight"] is diagram[0]
+    assert diagram["straight"] is diagram[0] and diagram[:1] == [diagram[0]]
     with pytest.raises(KeyError, match="no branch 'plain': there are 'straight', 'branch 1'"):
         _ = diagram["plain"]
     first = diagram.special("branch point", "straight")[0]

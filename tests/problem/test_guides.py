@@ -21,9 +21,11 @@ from rodfem import (
     Plan,
     Scene,
     Solver,
+    at,
     circular_guide,
     clamped,
     run,
+    sliding,
     sliding_hinge,
     trace,
 )
@@ -182,3 +184,17 @@ def test_a_column_whose_tip_runs_on_a_circle(radius: float) -> None:
 def test_mistakes(make: Callable[[], object], words: str) -> None:
     with pytest.raises(InputError, match=words):
         make()
+
+
+def test_a_clamp_slides_along_an_inclined_line_by_an_equation() -> None:
+    """As the same rod turned, whose line is an axis."""
+
+    def push_along(c: Any) -> tuple[Any, ...]:
+        return (0.0, -c.P * sin(TILT), -c.P * cos(TILT))
+
+    turned = (cos(TILT / 2), sin(TILT / 2), 0.0, 0.0)
+    line = at(1.0, lambda x, c: cos(TILT) * x.r[1] - sin(TILT) * (x.r[2] - 1))
+    load, tip = (0.0, 500.0), (0.0, -sin(TILT), None)
+    inclined = column(clamped(), sliding((0.0, None, None), force=push_along), load, constraints=(line,), planar="e1")
+    upright = column(clamped(rotation=turned), sliding(tip, turned, lambda c: (0.0, 0.0, -c.P)), load, planar="e1")
+    assert critical(inclined, "auto") == pytest.approx(critical(upright, "auto"), rel=1e-9)
