@@ -118,12 +118,12 @@ class Report(Observer):
         self.say(f"Compiling the forms for the first time (some seconds; kept in {kept} for later runs) ...")
 
     def system(self, system: System, accuracy: float | None = None) -> None:
-        """Say what is solved, with how many unknowns, what was left out, and the accuracy asked for."""
+        """Say what is solved, with how many unknowns, and the accuracy asked for."""
         scene, f = system.scene, system.fields
         self.say(f"{scene.title or scene.name}: {scene.rod} rod, {mesh_in_words(mesh_of(system))}")
         if accuracy is not None:
             self.detail(f"  to start with: meshes are chosen on the way for an accuracy of {accuracy:g}")
-        self.detail(f"  unknowns: {f.describe()}, load {scene.load}")
+        self.detail(f"  unknowns: {', '.join([*f.dofs, *f.scalars])}")
         self.units, self.load = scene.units, scene.load
         self.count = INDEX if scene.conservative else COUNT
         self.eigenvalues, self.unstable = MOTIONS[scene.inertia.order - 1]
@@ -131,8 +131,6 @@ class Report(Observer):
         if not scene.conservative:
             loads = ", ".join(scene.without_potential())
             self.say(f"  not conservative ({loads}): stability is a matter of {self.eigenvalues}, not of an index")
-        for line in f.left_out():
-            self.detail(f"  left out: {line}")
         self._ignored(scene)
 
     def _ignored(self, scene: Scene) -> None:

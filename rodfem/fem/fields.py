@@ -372,34 +372,6 @@ class Fields:
             out.setdefault(unknown.group, []).append(unknown)
         return out
 
-    def describe(self) -> str:
-        """Fields and scalars in words, for the terminal."""
-        names = {
-            "q": "rotation q",
-            "angle": "angle of rotation",
-            "eta": "unit-norm multiplier eta",
-            "v": "strain v",
-            "r": "centreline r",
-            "n": "contact force n",
-        }
-        words = [f"{names.get(b.name, f'multiplier {b.name}')} (P{b.degree})" for b in self.blocks]
-        words += [f"{g.words} {', '.join(x.name for x in members)} (scalar)" for g, members in self.groups.items()]
-        return ", ".join(words)
-
-    def left_out(self) -> list[str]:
-        """Fields and strains that are not unknowns of this scene, each with the reason."""
-        scene, lines = self.scene, []
-        if scene.normal is not None:
-            lines.append(
-                f"rotations, displacement, force and strain out of the plane across {scene.planar}: "
-                "one angle is left of the rotation"
-            )
-            if scene.conservative and (loads := scene.without_potential(in_space=True)):
-                lines.append(f"the index in space: no potential there has the {loads[0]}")
-        if fixed := [f"v{i + 1}" for i in range(3) if i not in scene.free_strains]:
-            lines.append(f"strain {', '.join(fixed)}: the rod is {scene.rod}")
-        return lines + self.formulation.left_out(scene)
-
     # --- derivatives in arclength ------------------------------------------------------------------------------
 
     @cached_property

@@ -12,7 +12,7 @@ from rodfem.errors import InputError
 from rodfem.forms import lagrangian
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
 from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
-from rodfem.problem.functions import LETTERS, PLACES, SIDES, needs_centreline
+from rodfem.problem.functions import LETTERS, PLACES, needs_centreline
 from rodfem.problem.quaternions import of_vector, product
 
 if TYPE_CHECKING:
@@ -169,10 +169,6 @@ class Formulation:
         """Scalar unknowns in addition to those of the parts of the scene."""
         return []
 
-    def left_out(self, scene: Scene) -> list[str]:
-        """What is no unknown, each with the reason."""
-        return []
-
     def integrand(self, equations: Equations, W: Any, along: Place) -> Any:
         """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`rodfem.forms.lagrangian`."""
         return lagrangian.pointwise(W, along.R, along.v, along.dr, equations.unknowns.n)
@@ -233,30 +229,14 @@ class Reduced(Formulation):
     def unknowns(self, scene: Scene) -> list[Unknown]:
         """Components ``n1``.. of a constant contact force, and positions of ends."""
         c, inside = scene.constants(), [i for i in range(3) if i != scene.normal]
-        force = Group(
-            CONTACT_FORCE,
-            "contact force",
-            "position of the ends along e{}",
-            Motion.VECTOR,
-            lambda c: [scene.known_force(i, c) for i in range(3)],
-        )
+        known = lambda c: [scene.known_force(i, c) for i in range(3)]  # noqa: E731
+        force = Group(CONTACT_FORCE, "position of the ends along e{}", Motion.VECTOR, known)
         out = [Unknown(force, i, UNIT[i]) for i in inside if scene.known_force(i, c) is None]
         for side, end in enumerate(scene.sides):
             if not scene.plain[side]:
-                place = Group(LETTERS[side], f"position of the {SIDES[side]} end", "", Motion.POSITION, end.support)
+                place = Group(LETTERS[side], "", Motion.POSITION, end.support)
                 out += [Unknown(place, i, UNIT[i]) for i in inside if end.support(c)[i] is None]
         return out
-
-    def left_out(self, scene: Scene) -> list[str]:
-        """Centreline and field of the contact force, and which components of that are known."""
-        lines = [
-            "centreline r and the field of contact force: no force acts along the rod, "
-            "so that the contact force is constant"
-        ]
-        known = [f"n{i + 1}" for i in range(3) if scene.known_force(i, scene.constants()) is not None]
-        if known:
-            lines.append(f"contact force {', '.join(known)}: a dead force at an end that is free to move there")
-        return lines
 
     def integrand(self, equations: Equations, W: Any, along: Place) -> Any:
         """With the integral of ``r' = R v``."""

@@ -63,7 +63,6 @@ class Group:
     """
 
     name: str
-    words: str
     equation: str
     motion: Motion
     known: Callable[[Constants], Sequence[Any]] | None = field(default=None, compare=False)
@@ -233,7 +232,7 @@ class Attachment(Contribution):
             yield inertia.rotary(at.x.q, at.first.q, at.second.q, tuple(self.rotary_inertia(at.c)))
 
 
-MULTIPLIERS = Group("g", "multipliers of constraints", "constraint {} of the scene", Motion.MIXED)
+MULTIPLIERS = Group("g", "constraint {} of the scene", Motion.MIXED)
 
 
 @dataclass(frozen=True)
@@ -327,7 +326,7 @@ class Everywhere(Constraint):
         return [Block(f"{self.letter}{number + 1}", 1, degree if self.nodal else degree - 1, self.nodal, True, True)]
 
 
-MEAN = Group("h", "mean pressure of surfaces", "surface {} of the scene", Motion.MIXED)
+MEAN = Group("h", "surface {} of the scene", Motion.MIXED)
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ from rodfem.problem.contribution import (
     Site,
     Unknown,
 )
-from rodfem.problem.functions import LETTERS, SIDES, Constants, Given, OfPlace, Place, Quaternion, Role, role_field
+from rodfem.problem.functions import LETTERS, Constants, Given, OfPlace, Place, Quaternion, Role, role_field
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, TURNS
 from rodfem.tolerances import NEGLIGIBLE
@@ -168,10 +168,8 @@ class End(Contribution):
         """Moments of a moving clamp or a hinge, and forces of a guide."""
         directions = self._stiff(normal)
         motion = Motion.MIXED if len(directions) == 2 else Motion.VECTOR
-        words = f"moment at the {SIDES[number]} end"
-        group = Group(f"m{LETTERS[number]}", words, "rotation of an end, direction {}", motion, moment=True)
-        words = f"force of the guide at the {SIDES[number]} end"
-        guide = Group(f"f{LETTERS[number]}", words, "guide of an end, direction {}", Motion.MIXED)
+        group = Group(f"m{LETTERS[number]}", "rotation of an end, direction {}", motion, moment=True)
+        guide = Group(f"f{LETTERS[number]}", "guide of an end, direction {}", Motion.MIXED)
         moments = [Unknown(group, i, direction) for i, direction in enumerate(directions)]
         return moments + [Unknown(guide, i, direction) for i, direction in enumerate(self.guiding())]
 
@@ -251,10 +249,8 @@ def normals(axis: Direction) -> list[Direction]:
     return [tuple(map(float, row)) for row in np.linalg.svd(np.array([axis], dtype=float))[2][1:]]
 
 
-CLOSING_MOMENT = Group(
-    "t", "closing moment", "closing of the ring's rotation, component {}", Motion.CLOSING, moment=True
-)
-CLOSING_FORCE = Group("f", "closing force", "closing of the ring along e{}", Motion.CLOSING)
+CLOSING_MOMENT = Group("t", "closing of the ring's rotation, component {}", Motion.CLOSING, moment=True)
+CLOSING_FORCE = Group("f", "closing of the ring along e{}", Motion.CLOSING)
 
 
 @dataclass(frozen=True)

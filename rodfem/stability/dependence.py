@@ -2,30 +2,19 @@ r"""Whether the constraints depend on one another at a state, which is known to 
 
 The index and all eigenvalues rest on the constraints' gradients ``C`` (m, p) having full column rank.  Its smallest
 singular value ``sigma`` says how far it is from losing it; for pointwise constraints on linear elements it shrinks like
-the size h of an element, ``sigma / h`` tends to a constant (Kumar & Healey 2010, Table 5).  ``1 / sigma^2`` is the
-greatest eigenvalue of ``(C^t C)^-1``, found by Lanczos' method.  Products with it come from
-
-    ( a I  C ) ( x )   (  0 )
-    ( C^t  0 ) ( y ) = ( -b ),        y = a (C^t C)^-1 b:
-
-the condition number of this sparse matrix is that of ``C``, where ``C^t C`` would square it.
+the size h of an element, ``sigma / h`` tends to a constant (Kumar & Healey 2010, Table 5).
 
 Where ``C`` loses rank multipliers are not unique, and no index is defined: if a constraint follows from others, or at
 single states.  A rod that cannot stretch, between ends as far apart as it is long, is *taut*: turned by ``theta``
 across its axis it shortens by ``int theta^2 / 2``, to first order not at all.  A tension that is the same all along is
 in the kernel of ``C``, on any mesh: any balances the straight rod.  From each thrust at which it buckles a branch
-begins there, and which of them Newton's method finds round-off decides.
-
-Newton's method converges by halves to such a state and ends some ``1e-8`` away, where ``sigma`` is as small.  With
-the unit vectors ``C w = sigma u`` the derivative of ``sigma`` is ``H u``, where ``H`` is the second derivative of
-``w . c``, the part of the Lagrangian's that belongs to the multipliers ``w``.  ``sigma / |H u|`` is, to first order,
-the least distance of a state at which constraints depend, whatever their units and the mesh.  Within the accuracy of
-states the constraints depend on one another.
+begins there, and which of them Newton's method finds round-off decides.  It converges by halves to such a state and
+ends some ``1e-8`` away, where ``sigma`` is as small.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -33,17 +22,17 @@ import scipy.sparse.linalg as spl
 from petsc4py import PETSc
 
 from rodfem.errors import SceneError
-from rodfem.fem.newton import STALLED
+from rodfem.fem.formulations import CONTACT_FORCE
 from rodfem.fem.shape import Shape
-from rodfem.fem.system import System
+from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.pencil import Blocks, Pencil
-from rodfem.tolerances import NEGLIGIBLE, SAME_LOAD
+from rodfem.tolerances import SAME_LOAD
 
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
 TIGHT = "the rod cannot stretch and is taut, any tension balances it; begin where it is slack, or let it stretch."
-DOUBTFUL = 1e-5
-"""A singular value above this, relative to the greatest column, is far from zero."""
+WEAK = 1e-7
+"""Part of unit gradients that is left where they cancel, below which constraints depend on one another."""
 TAUT = 1e-9
 """Part of a direction, and distance of a state from the scene's start, in the metric, that is round-off."""
 
@@ -57,18 +46,16 @@ def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec
     system = shape.system
     if start is not None and system.norm(start - x) < TAUT:
         x = start
-    blocks = Blocks(system)
-    pencil = blocks.assemble(x)
-    for sigma, w in weak_combinations(pencil, system.scene.length):
-        if sigma > DOUBTFUL or (sigma > NEGLIGIBLE and _distance(blocks, x, pencil, w) > STALLED):
-            continue
-        names = dependent_equations(pencil, _equations(system), w)
+    pencil = Blocks(system).assemble(x)
+    if not pencil.C.shape[1]:
+        return
+    scalars = [u for u in system.fields.unknown_scalars if u.multiplier]
+    reach = [pencil.where["scalars"][i] for i, u in enumerate(scalars) if u.group.name == CONTACT_FORCE]
+    sigma, w = weakest(pencil, np.append(pencil.where.get(CONTACT_FORCE, []), reach).astype(int), system.scene.length)
+    if sigma <= WEAK:
+        names = dependent_equations(pencil, [u.group.equation.format(u.component + 1) for u in scalars], w)
         remedy = TIGHT if taut(shape, x) else "remove those that follow from the others."
         raise SceneError(f"Constraints depend on one another ({names}): {remedy}")
-
-
-def _equations(system: System) -> list[str]:
-    return [u.group.equation.format(u.component + 1) for u in system.fields.unknown_scalars if u.multiplier]
 
 
 def may_depend(shape: Shape, x: PETSc.Vec) -> bool:
@@ -103,69 +90,32 @@ def taut_where_it_turns(shape: Shape, x: PETSc.Vec) -> str:
     )
 
 
-def weak_combinations(pencil: Pencil, length: float) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield what is left where gradients cancel best, over the greatest, and their multipliers (p,).
+def weakest(pencil: Pencil, reach: np.ndarray, length: float) -> tuple[float, np.ndarray]:
+    """Smallest singular value of the gradients, each over its norm, and their multipliers (p,).
 
-    Of unit gradients, and of gradients as they are: one that nearly vanishes is a unit one all the same, but it may be
-    small for its unit alone, so that its size is at least :data:`NEGLIGIBLE`.  Positions are over the ``length``.
+    Those of positions, at the places ``reach``, are over the ``length`` of the rod at least: where it is taut one
+    vanishes.
     """
-    C = sp.diags(_units(pencil, length)) @ pencil.C
+    units = np.ones(pencil.C.shape[0])
+    units[[i for name in ("r", "ends") for i in pencil.where.get(name, ())]] = length
+    C = sp.diags(units) @ pencil.C
     norms = spl.norm(C, axis=0)
-    if not len(norms):
-        return
+    norms[reach] = np.maximum(norms[reach], length)
     scale = 1.0 / np.where(norms > 0.0, norms, 1.0)
     sigma, vector = smallest_singular(C @ sp.diags(scale))
-    yield sigma, scale * vector
-    sigma, vector = smallest_singular(C)
-    yield max(sigma / norms.max(), NEGLIGIBLE), vector
-
-
-def _distance(blocks: Blocks, x: PETSc.Vec, pencil: Pencil, w: np.ndarray) -> float:
-    """Distance of the state ``x``, to first order, from one where the gradients cancel along multipliers ``w`` (p,)."""
-    change, unit = pencil.C @ w, _units(pencil, blocks.system.scene.length)
-    sigma = float(np.linalg.norm(unit * change))
-    change *= unit**2 / (sigma or 1.0)
-    # the blocks are linear in the multipliers: of this many both parts have entries of one size
-    many = spl.norm(pencil.K) / (spl.norm(pencil.C) * np.linalg.norm(w)) or 1.0
-    other, (mine, places) = x.copy(), blocks.own(blocks.columns)
-    other.array[places] += many * w[mine]
-    slope = unit * ((blocks.assemble(other).K - pencil.K) @ change) / many
-    steepness = float(np.linalg.norm(slope) * np.sqrt(len(change)))
-    if not steepness:
-        return np.inf if sigma else 0.0
-    return sigma / steepness
-
-
-def _units(pencil: Pencil, length: float) -> np.ndarray:
-    """Natural size of each row (m,) of a pencil: that of a position is the ``length`` of the rod."""
-    found = np.ones(pencil.C.shape[0])
-    for name in {"r", "ends"} & set(pencil.where):
-        found[pencil.where[name]] = length
-    return found
+    return sigma, scale * vector
 
 
 def smallest_singular(C: sp.spmatrix) -> tuple[float, np.ndarray]:
-    """Smallest singular value of ``C`` (m, p), p > 0, and its right vector (p,); zero where C is exactly singular."""
+    """Smallest singular value of ``C`` (m, p), p > 0, and its right vector (p,)."""
     C = sp.csr_matrix(C)
     m, p = C.shape
     if p <= 300 or p > m:  # LAPACK takes no time
         _, s, vt = np.linalg.svd(C.toarray(), full_matrices=p > m)
         return (float(s[-1]) if p <= m else 0.0), vt[-1]
-    size = float(spl.norm(C, axis=0).max())
-    try:
-        lu = spl.splu(sp.bmat([[size * sp.identity(m), C], [C.T, None]]).tocsc())
-    except RuntimeError:
-        return 0.0, np.full(p, p**-0.5)
-
-    def product(b: np.ndarray) -> np.ndarray:
-        return np.asarray(lu.solve(np.append(np.zeros(m), -b.ravel()))[m:] / size)
-
-    start = product(product(generic(np.arange(p))))
-    if not np.isfinite(start).all():
-        return 0.0, np.full(p, p**-0.5)
-    operator = spl.LinearOperator((p, p), matvec=product, dtype=float)
-    start /= np.linalg.norm(start)
-    _, vectors = spl.eigsh(operator, k=1, which="LM", v0=start, tol=1e-6)  # the vector shows sigma to all digits
+    gram, start = (C.T @ C).tocsc(), generic(np.arange(p))
+    tolerance = 1e-6  # of the vector, which shows sigma to all digits
+    _, vectors = spl.eigsh(gram, 1, sigma=-EPS * gram.diagonal().max(), v0=start, tol=tolerance)
     return float(np.linalg.norm(C @ vectors[:, 0])), vectors[:, 0]
 
 

@@ -196,7 +196,7 @@ def hinge(bending: float, spring: float) -> Scene:
 
 @pytest.mark.ranks
 @pytest.mark.long
-@pytest.mark.parametrize("bending", [*(pytest.param(b, marks=pytest.mark.alone) for b in (1.0, 1e6, 1e12)), 1e9])
+@pytest.mark.parametrize("bending", [*(pytest.param(b, marks=pytest.mark.alone) for b in (1.0, 1e6)), 1e9])
 def test_a_rotation_against_a_spring_is_no_symmetry(bending: float) -> None:
     """Beside 1e9 a spring of 1 was round-off in the functional, and the rod stable on its whole range, to P = 4."""
     system = Solver(hinge(bending, 0.5), Discretization(elements=3, degree=4)).equilibria.system
