@@ -100,7 +100,11 @@ class State:
 
     def view(self) -> Floats:
         """Axes of the picture, (3, 3)."""
-        return axes_of(self.setting, self.reference, self.centres - self.reference, self.directors[0])
+        setting, reference = self.setting, self.reference
+        feet = sum(bool(x.held.any()) for x in setting.supports) > 1
+        along = {"axis": axis_of(setting, reference), "down": setting.gravity, "load": setting.force}
+        side = setting.widest(self.directors[0])
+        return view_of(reference, self.centres - reference, side=side, feet=feet, **along)
 
     def solids(self, look: Look) -> list[Solid | Glyph]:
         """The rod, its stripe, what holds it and what loads it."""
@@ -179,13 +183,6 @@ def _write(plotter: Any, caption: str, notes: Sequence[str], solids: Sequence[So
 
 
 # --- from where a rod is seen
-
-
-def axes_of(setting: Setting, reference: Floats, moved: Floats, frame: Floats) -> Floats:
-    """Axes (3, 3) of the picture of a rod that has ``moved`` (n, 3) from ``reference`` (n, 3), in its ``setting``."""
-    load, feet = setting.force, sum(bool(x.held.any()) for x in setting.supports) > 1
-    along = {"axis": axis_of(setting, reference), "down": setting.gravity, "side": setting.widest(frame)}
-    return view_of(reference, moved, load=load, feet=feet, **along)
 
 
 def axis_of(setting: Setting, reference: Floats) -> Floats:

@@ -144,20 +144,15 @@ def check_run(data: dict[str, Any], states: Path) -> None:
         )
 
 
-def curve_of(s: Floats, r: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Centreline (n, 3) and unit quaternions (n, 4) of a state at arclengths ``at`` (n,), by splines."""
-    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
-    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
-    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
-    return CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
-
-
 def curve_at(group: Mapping[str, Any], row: int, count: int) -> tuple[Floats, Floats, Floats]:
     """Arclengths (count,), centreline (count, 3) and unit quaternions (count, 4) of a row of the group of a branch."""
-    s, r, q = (np.asarray(group[name][row]) for name in ("s", "r", "q"))
-    known = np.isfinite(s)  # the rows of a mesh with fewer nodes end in nan
-    at = np.linspace(s[0], s[known][-1], count)
-    return at, *curve_of(s[known], r[known], q[known], at)
+    known = np.isfinite(group["s"][row])  # the rows of a mesh with fewer nodes end in nan
+    s, r, q = (np.asarray(group[name][row])[known] for name in ("s", "r", "q"))
+    opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
+    signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
+    at = np.linspace(s[0], s[-1], count)
+    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
+    return at, CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
 
 # --- ParaView

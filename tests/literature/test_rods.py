@@ -289,6 +289,3 @@ def test_clothoid(planar: str | None) -> None:
     last = explore(rod).branches[0].points[-1]
     assert (last.load, last.negative) == (a, 0)
     assert last.ordinate == pytest.approx(hypot(*fresnel(sqrt(a / pi))) / sqrt(a / pi), rel=1e-8)
-
-
-# --- error bars -----------------------------------------------------------------------------------------------------
