@@ -421,11 +421,6 @@ TABLE = {
         "constants-are-compared": (
             "abs(symbolic - number) <= least:", "abs(symbolic - number) <= 1e9:", "problem/test_mistakes.py"),
     },
-    "rodfem/problem/units.py": {
-    },
-    "rodfem/problem/validation.py": {
-        "starts-that-jump": ("if left > TURNED / 2:", "if left > 9:", "problem/test_mistakes.py"),
-    },
     "rodfem/report/branches.py": {
         "loci-of-small-loads-start-everywhere": (
             '(natural["load"], natural["ordinate"])', "(1.0, 1.0)", "codim2/test_locus.py"),
