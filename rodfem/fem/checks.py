@@ -192,10 +192,7 @@ class Pieces:
         return Cells(np.ascontiguousarray(x.reshape(-1, 2, 3)), dofs.reshape(-1, dofs.shape[-1]))
 
     def _tabulated(self, *cuts: int) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each field the rows (size, nodes), and its basis at the nodes of pieces, (pieces, nodes, nodes).
-
-        Scalars come last, as a field of one node.
-        """
+        """Of each field the rows (size, nodes), and its basis at the nodes of pieces, (pieces, nodes, nodes)."""
         out, scalar = list[tuple[np.ndarray, np.ndarray]](), np.ones(self.dofs.shape[1], dtype=bool)
         for x in self.fields.blocks:
             rows = self.rows[x.name].T

@@ -89,10 +89,7 @@ class _Begun(BaseException):
 
 @contextmanager
 def _from_cache(comm: MPI.Comm) -> Iterator[None]:
-    """Raise :class:`SetupError` if the cache cannot be written, :class:`SceneError` for what cannot be compiled.
-
-    Of several ranks the first of ``comm`` compiles; all fail together, and the first alone knows why.
-    """
+    """Raise :class:`SetupError` if the cache cannot be written, :class:`SceneError` for what cannot be compiled."""
     try:
         yield
     except OSError as error:

@@ -67,10 +67,7 @@ class QuaternionField:
         return np.asarray(values / np.linalg.norm(values, axis=-1, keepdims=True))
 
     def start(self, start: Start, s: np.ndarray, interval: tuple[float, float]) -> np.ndarray:
-        """Values (m, size) at arclengths (m,) of a scene's ``start``, a straight rod without one.
-
-        The signs of its quaternions are a matter of choice: values are made continuous along the rod from its left end.
-        """
+        """Values (m, size) at arclengths (m,) of a scene's ``start``, a straight rod without one."""
         every, place = np.unique(np.append(np.linspace(*interval, PLACES), s), return_inverse=True)
         q = np.tile(IDENTITY, (len(every), 1)) if start is None else np.asarray(start(every), dtype=float)
         return self._continuous(q)[place.ravel()[PLACES:]]
@@ -290,10 +287,7 @@ class Reduced(Formulation):
 def _end_position(
     side: int, scene: Scene, c: Constants, scalars: Mapping[str, Any], given: Callable[[Any], Any] = lambda x: x
 ) -> list[Any]:
-    """Position of the end on one ``side``: ``given(held)``, a scalar unknown by its name, or None (known force there).
-
-    Across the plane of a planar rod an end that nothing holds is where the plane is: at zero.
-    """
+    """Position of the end on one ``side``: ``given(held)``, a scalar unknown by its name, or None (known force)."""
     return [
         given(x) if x is not None else scalars.get(f"{LETTERS[side]}{i + 1}", 0.0 if i == scene.normal else None)
         for i, x in enumerate(scene.sides[side].support(c))

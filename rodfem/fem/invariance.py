@@ -255,11 +255,7 @@ def _generic(fields: Fields, block: Block, x: np.ndarray, rng: np.random.Generat
 def _rotated(
     scene: Scene, values: np.ndarray, wave: Callable[[], np.ndarray], x: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Quaternions at ``x``, not of length one, that are far from zero: ``values`` about one direction.
-
-    Where a ring is closed by ``-q`` they are of one sign at its start and of the other at its end, with another
-    ``wave`` between.
-    """
+    """Quaternions at ``x``, not of length one, that are far from zero: ``values`` about one direction."""
     u, v = np.linalg.qr(rng.normal(size=(4, 2)))[0].T
     clamps = [end.fixed_rotation for end in scene.sides if end.fixed_rotation is not None]
     u = np.array(clamps[0]) if clamps else u  # far from a clamp a rotation would come to it in a jump
@@ -269,10 +265,7 @@ def _rotated(
 
 
 def _turned(fields: Fields, values: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Rotations (..., size) that are those of clamps at the ends: a jump there would be a curvature without bound.
-
-    The angle of a ring turns in all as its start does.
-    """
+    """Rotations (..., size) that are those of clamps at the ends: a jump there would be a curvature without bound."""
     scene, turning = fields.scene, fields.turning
     if scene.closed:
         if turning.name == "q":

@@ -98,10 +98,7 @@ class TableFunctions:
         return ""
 
     def cut(self, *cuts: int) -> TableFunctions:
-        """The same on equal pieces of this rank's elements, those of the first piece of all elements before others.
-
-        The pieces of several cuts, with the given numbers of pieces each, come one cut after the other.
-        """
+        """The same on equal pieces of this rank's elements, those of the first piece of all elements before others."""
         out, own = copy(self), self.along[: self._fields.owned_cells]
         values = own.reshape(len(own), self._degree + 1, -1)
         cut = np.concatenate([compat.basis_on_pieces(self._degree, n) for n in cuts])[:, None] @ values
@@ -176,10 +173,7 @@ def _moments(table: Table, a: float, b: float, p: int) -> tuple[np.ndarray, floa
 
 
 def readable(form: Any, mesh: Any, known: TableFunctions | None = None) -> Any:
-    """Return a form, or an expression, with what is ``known`` for tables, and constants on ``mesh`` for its numbers.
-
-    Integers and powers stay.  What is no form, as a sum without terms, is returned as it is.
-    """
+    """Return a form, or an expression, with what is ``known`` for tables, and constants on ``mesh`` for its numbers."""
     if not isinstance(form, (ufl.Form, Expr)):
         return form
     if known is None or known.function is None:  # to look for numbers takes a third of the time of a map

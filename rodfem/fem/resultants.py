@@ -250,10 +250,7 @@ def reactions(resultants: Resultants, x: PETSc.Vec) -> Reactions:
 
 
 def _of_support(resultants: Resultants, x: PETSc.Vec, side: int, contact: np.ndarray) -> Reaction:
-    """Force and moment of the support of an end; what no row of the equations tells is that of the ``contact`` (2, 3).
-
-    Without a centreline the position of an end is a scalar unknown where it moves under more than dead forces.
-    """
+    """Force and moment of the support of an end, where no row of the equations has them those of the ``contact``."""
     shape = resultants.shape
     system, fields, scene = shape.system, shape.system.fields, shape.system.scene
     if scene.closed:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.polynomial import legendre
+from numpy.polynomial import Polynomial, legendre
 from petsc4py import PETSc
 
 from rodfem import compat
@@ -21,27 +21,6 @@ from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.functions import derived
 from rodfem.problem.quaternions import CONJUGATE, directors, product
 from rodfem.writhe import lies_on_itself, writhe
-
-
-def minimum(powers: list[float], t: float, spacing: float) -> float:
-    """Value of a polynomial, given by rising powers, at its minimum within ``spacing`` of ``t``, by Newton's method."""
-    low, high = max(t - spacing, -1.0), min(t + spacing, 1.0)
-    slopes = [i * p for i, p in enumerate(powers)][1:]
-    bends = [i * p for i, p in enumerate(slopes)][1:]
-    for _ in range(6):
-        bend = horner(bends, t)
-        if bend <= 0:
-            break
-        t = min(max(t - horner(slopes, t) / bend, low), high)
-    return horner(powers, t)
-
-
-def horner(powers: list[float], t: float) -> float:
-    """Value at ``t`` of the polynomial with these coefficients of rising powers."""
-    value = 0.0
-    for p in reversed(powers):
-        value = value * t + p
-    return value
 
 
 class Shape:
@@ -88,19 +67,19 @@ class Shape:
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
 
-        Newton's method finds the minimum of the polynomial in each element whose least value at many points is above
-        that of the rod by less than a change between neighbours.
+        It is sought where the derivative of the polynomial vanishes, in each element whose least value at many points
+        is above that of the rod by less than a change between neighbours.
         """
         if 2 not in self.system.scene.free_strains:
             return 1.0
         nodal = self.system.at(x).values("v")[self.cells, :, -1]
         samples = nodal @ self._v_at_samples.T
-        lowest, comm, spacing = samples.min(axis=1), self.system.comm, 2.0 / (samples.shape[1] - 1)
+        lowest, comm = samples.min(axis=1), self.system.comm
         least = comm.allreduce(float(lowest.min()), op=MPI.MIN)
         near = lowest - least < abs(np.diff(samples)).max(axis=1)
-        powers, begin = nodal[near] @ self._v_to_powers.T, -1.0 + spacing * samples[near].argmin(axis=1)
-        turns = [minimum(p, t, spacing) for p, t in zip(powers.tolist(), begin.tolist(), strict=True)]
-        return float(comm.allreduce(min([least, *turns]), op=MPI.MIN))
+        curves = map(Polynomial, nodal[near] @ self._v_to_powers.T)
+        inside = [p(np.clip(p.deriv().roots().real, -1.0, 1.0)) for p in curves]
+        return float(comm.allreduce(min([least, *np.concatenate([*inside, []]).tolist()]), op=MPI.MIN))
 
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
         """All of a state in natural order on every rank, independent of the number of ranks.
@@ -163,10 +142,7 @@ class Shape:
         return self.system.vector(f.filled(named))
 
     def with_centreline(self, given: NodalValues) -> PETSc.Vec:
-        """State with the centreline, or the scalar positions of the ends, that rotations and strains integrate to.
-
-        What then misses a held end is spread evenly over the rod.
-        """
+        """State with the centreline, or the scalar positions of the ends, that rotations and strains integrate to."""
         system, out, c = self.system, given.local.copy(), given.constants()
         before, inside, chord = self.integrals(self.slopes(given))
         left, right = ([None if p is None else float(p) for p in end.support(c)] for end in system.scene.sides)
@@ -324,10 +300,7 @@ def transferred(source: Shape, target: System, vector: PETSc.Vec, *, state: bool
 
 
 def interpolated(table: np.ndarray, ends: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Values (cells, n, components) at the arclengths ``x`` (cells, n) of polynomials on elements between ``ends``.
-
-    ``table`` (elements, nodes, components) has them at the nodes of the elements, from left to right.
-    """
+    """Values (cells, n, components) at the arclengths ``x`` (cells, n) of polynomials on elements between ``ends``."""
     inwards = x + 1e-9 * (x.mean(axis=1, keepdims=True) - x)  # the end of a cell belongs to that cell
     cell = np.clip(np.searchsorted(ends, inwards) - 1, 0, len(table) - 1)
     local, degree = (x - ends[cell]) / (ends[cell + 1] - ends[cell]), table.shape[1] - 1

@@ -145,10 +145,7 @@ class NodalValues:
         return self.integral(self.equations.energy)
 
     def energies(self) -> Energies:
-        """All energies of an equilibrium; collective.
-
-        The equations have one for the load, that nobody solves: ``dV/dload``.
-        """
+        """All energies of an equilibrium; collective."""
         if self.equations.potential is None:
             return Energies(self.energy(), float("nan"), float("nan"))
         out, fields = np.zeros(3), self.fields
@@ -216,10 +213,7 @@ class State(NodalValues):
         return matrix
 
     def assemble_into(self, matrix: PETSc.Mat, form: Assembler, *, load: bool = False) -> None:
-        """Add a bilinear form to a matrix of the system, with or without the load's column.
-
-        The caller assembles the matrix (``matrix.assemble()``) when all is added.
-        """
+        """Add a bilinear form to a matrix of the system, with or without the load's column."""
         if (own := shared(matrix)) is not None:
             self._add(form, self.system.matrix_places(own.pattern, load), own.values)
             matrix.stateIncrease()

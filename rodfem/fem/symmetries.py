@@ -159,10 +159,7 @@ def _turning(normal: int | None, i: int) -> list[Elementary]:
 
 
 def _of_strains(free: list[int]) -> list[Elementary]:
-    """Changes of the ``free`` strains by turnings of the cross-sections about each axis.
-
-    A strain that the rod constrains is zero, a stretch one.
-    """
+    """Changes of the ``free`` strains by turnings of the cross-sections about each axis."""
     turned, constrained = np.array([cross(axis) for axis in AXES])[:, free], np.array([0.0, 0.0, 1.0])
     constrained[free] = 0.0
     changed = [(x[:, free], x @ constrained) for x in turned]
@@ -332,10 +329,7 @@ def phase_at(system: System, reference: PETSc.Vec) -> Phase:
 
 
 def _generic_forces(system: System, rigid: Generators, state: State, numbers: list[int]) -> np.ndarray:
-    """``M sum_j w_j m_j`` at a ``state`` for the drift scalars of these ``numbers``, (count, own rows).
-
-    The weights ``w`` differ from number to number, ``m`` are the ``rigid`` motions, of metric norm one.
-    """
+    """``M sum_j w_j m_j`` at a ``state`` for the drift scalars of these ``numbers``, (count, own rows)."""
     motions = rigid.at(state)
     images = system.weighed(motions)
     sizes = np.sqrt(np.maximum(system.sum(np.einsum("ij,ij->i", motions, images)), 0.0))
@@ -345,10 +339,7 @@ def _generic_forces(system: System, rigid: Generators, state: State, numbers: li
 
 
 def _orthogonal(system: System, state: State, gram: np.ndarray) -> tuple[np.ndarray, list[float], list[float]]:
-    """Weights of combinations of the generators at a ``state`` that are orthogonal in the metric, sizes, and bounds.
-
-    ``gram`` (count, count) are the products of the generators; one that is smaller than its bound is zero.
-    """
+    """Weights of combinations of the generators at a ``state`` that are orthogonal in the metric, sizes, and bounds."""
     symmetries, count = system.symmetries, len(system.symmetries)
     exact = [i for i, s in enumerate(symmetries) if not s.along]
     squares, combinations = gram.diagonal()[exact], np.eye(count)[exact]

@@ -81,11 +81,7 @@ class Kernel:
 
 
 def kernel(C: sp.spmatrix, place: np.ndarray) -> Kernel:
-    """Kernel of ``C^t``, for ``C`` (m, p) and arclengths ``place`` (p,) of groups of columns, nan for a dense one.
-
-    Raises :class:`InputError` if a constraint depends on the others, or if a row couples more than two neighbouring
-    groups.
-    """
+    """Kernel of ``C^t``, for ``C`` (m, p) and arclengths ``place`` (p,) of groups of columns, nan for a dense one."""
     C = sp.csr_matrix(C, copy=True)
     m = C.shape[0]
     scale = float(abs(C.data).max()) if C.nnz else 1.0
@@ -133,10 +129,7 @@ def _eliminated(C: sp.csr_matrix, group: np.ndarray, scale: float) -> Kernel:
 
 
 def _links(C: sp.csr_matrix, group: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Rows (links, rows) of each link, what they couple on its left and right (links, rows, width), and a number.
-
-    From that number on they are empty rows, which make all links equally long.
-    """
+    """Rows (links, rows) of each link, what they couple on its left and right (links, rows, width), and a number."""
     m, width = C.shape[0], int(np.bincount(group).max())
     groups = 2 ** int(np.ceil(np.log2(group.max() + 2))) - 1
     order = np.argsort(group, kind="stable")

@@ -138,8 +138,5 @@ class Chain:
 
 
 def factors_of(kind: str, comm: MPI.Comm, unknowns: int, scalars: int, sizes: Sizes | None = None) -> Factors:
-    """Factors for matrices of ``unknowns`` rows along a rod on a communicator, the last ``scalars`` of which are dense.
-
-    Those of another matrix, of 0 unknowns, and on several ranks are MUMPS's.
-    """
+    """Factors for matrices of ``unknowns`` rows along a rod (0: another matrix), the last ``scalars`` of them dense."""
     return Chain(kind, scalars, sizes) if unknowns and comm.size == 1 else Mumps(kind, sizes)

@@ -158,10 +158,7 @@ def require_compiler() -> None:
 
 @cache
 def missing_compiler() -> str:
-    """Sentence on what lacks for compiling C; empty if nothing does.
-
-    The compiler is that of the variable CC, of this Python, another one on the path, or that of ziglang.
-    """
+    """Sentence on what lacks for compiling C; empty if nothing does."""
     given = os.environ.get("CC") or sysconfig.get_config_var("CC") or OTHERS[0]
     if shutil.which(shlex.split(given)[0]) is None:
         if os.environ.get("CC"):

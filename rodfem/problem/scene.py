@@ -516,10 +516,7 @@ class Scene(Contribution, metaclass=Stated):
         return [(0.0, 0.0) if pair == (None, None) else pair for pair in pairs]
 
     def known_force(self, component: int, c: Constants) -> Any | None:
-        """Component of the contact force that a dead end force prescribes, or None where it is an unknown.
-
-        Free at the right end the contact force is the applied one, free at the left end it is minus the applied one.
-        """
+        """Component of the contact force that a dead end force prescribes, or None where it is an unknown."""
         for side, sign in ((1, 1), (0, -1)):
             force = self.sides[side].contact_force(c)[component]
             if self.plain[side] and force is not None:

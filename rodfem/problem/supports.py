@@ -97,10 +97,7 @@ def _point(scene: Scene, s: float, r: Floats, q: Floats) -> Place:
 
 
 def derivative_of(function: OfPlace, c: Constants, x: Place, order: int = 1) -> Floats:
-    """Derivatives of ``function(x, c)`` in position and rotation vector, in the frame of space: (2, 3), or (2, 3, 3).
-
-    Those of ``order`` 2 are in the position twice, and in the rotation vector twice.
-    """
+    """Derivatives of ``function(x, c)`` in position, and in rotation vector, both in space: (2, 3), or (2, 3, 3)."""
     change = ufl.variable(ufl.as_vector([0.0] * 6))  # of position and rotation vector, along e1 to e3
     spin = ufl.as_vector([change[3], change[4], change[5]])
     q = product(ufl.as_vector([1.0 - ufl.dot(spin, spin) / 8, spin[0] / 2, spin[1] / 2, spin[2] / 2]), x.q)

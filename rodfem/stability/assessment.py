@@ -282,10 +282,7 @@ class Dense(Method):
         return "" if unknowns <= LARGEST else f"is for at most {LARGEST} unknowns, not {unknowns}"
 
     def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
-        """By the symmetric ``T`` of :mod:`rodfem.stability.spectrum`, positive for a shift below all eigenvalues.
-
-        Raises :class:`InputError` if fewer than ``number`` are finite.
-        """
+        """By the symmetric ``T`` of :mod:`rodfem.stability.spectrum`, positive for a shift below all eigenvalues."""
         below = self.work.low_pencil(x)
         stiffness, mass = (gathered(A).real for A in below.scaled)
         pencil = Spectrum(stiffness, mass, below.shift)

@@ -103,11 +103,7 @@ def quotients(found: Factored, vectors: list[PETSc.Vec], least: float = 0.0) -> 
 
 
 def inside_band(found: Factored, number: int, accuracy: float = DECIDED, least: float = 0.0) -> Quotients:
-    """The ``number`` eigenvalues inside the band of the count, which were ``found``, of uncertainty ``least`` at least.
-
-    Those near zero have the relative ``accuracy``, the signs of the others are right.  Raises :class:`ConvergenceError`
-    if others are found than were counted.
-    """
+    """The ``number`` eigenvalues inside the band of the count at a state, of uncertainty ``least`` at least."""
     inertia = found.inertia
     theta, vectors = found.nearest(number + SPARE, DECIDED)
     vectors = [vectors[i] for i in np.argsort(abs(theta))]
@@ -125,11 +121,7 @@ def inside_band(found: Factored, number: int, accuracy: float = DECIDED, least: 
 
 
 def decide(found: Factored) -> Decision:
-    """Count at a state, and decide eigenvalues within the band by their Rayleigh quotients.
-
-    Raises :class:`ConvergenceError` for too many of those.  The factors of the count serve
-    :meth:`~rodfem.stability.inertia.Factored.nearest` afterwards.
-    """
+    """Count at a state, and decide eigenvalues within the band by their Rayleigh quotients."""
     index, inertia = found.count(), found.inertia
     inside, least = index.zero - found.drifts, ZERO_BAND * inertia.scale
     if inside == 0 or inertia.resolution <= least:
@@ -164,10 +156,7 @@ def soft_limit(inertia: Inertia) -> float:
 
 
 def near_zero(found: Factored, least: int = 0) -> NearZero:
-    """Soft eigenvalues at a state, and the ``least`` number nearest zero whatever their size; symmetries are left out.
-
-    The vectors that the next state starts from stay.  Raises :class:`ConvergenceError` if there are too many.
-    """
+    """Soft eigenvalues at a state, and the ``least`` number nearest zero whatever their size, without symmetries."""
     inertia, index = found.inertia, found.count()
     inside = index.zero - found.drifts
     members = _candidates(found, soft_limit(inertia), inside, least)

@@ -36,7 +36,6 @@ from rodfem.stability.pencil import (
     weighed_modes,
 )
 from rodfem.stability.spectrum import REAL, SHIFT, Eigenpairs, Spectrum, inside, size_of_zero, times
-from rodfem.tolerances import NEGLIGIBLE
 
 MULTIPLE, ALIKE = 1e-8, 1e-6
 """Eigenvalues that differ by less than this, relative, are one that is multiple; have one name, and one curve."""
@@ -101,10 +100,7 @@ class Frequencies:
 
 
 def label(system: System, found: Frequencies, turned: np.ndarray, number: int | None = None) -> Frequencies:
-    """Frequencies ``found`` at a state of a ``system``, the first ``number`` named; ``turned`` is its rotation field.
-
-    A multiple eigenvalue has one name, that of its invariant subspace: its vectors are any in it.
-    """
+    """Frequencies at a state with the rotation field ``turned``, the first ``number`` of them named."""
     together = [g for g in groups(found.values, found.far, ALIKE) if number is None or g[0] < number]
     owner = np.repeat(np.arange(len(together)), list(map(len, together)))
     vectors = np.concatenate([_span(system.comm, found, group) for group in together], axis=1)
@@ -125,10 +121,7 @@ def _span(comm: MPI.Comm, found: Frequencies, group: list[int]) -> np.ndarray:
 
 
 def groups(values: np.ndarray, far: float, tolerance: float = MULTIPLE) -> list[list[int]]:
-    """Places of equal eigenvalues, which differ by less than a relative ``tolerance``, in order of the first of each.
-
-    Those near zero are compared with what is ``far`` from it.
-    """
+    """Places of eigenvalues that differ by less than a ``tolerance``, relative to them or to what is ``far``."""
     out: list[list[int]] = []
     sizes = tolerance * np.maximum(abs(values), min(abs(values).max(initial=0.0), far) / 100)
     if (abs(values[:, None] - values) < sizes[:, None]).sum() <= len(values):  # no two of them
@@ -215,18 +208,6 @@ class NonsymmetricPencil:
         """All of matrix and a ``mass``, in units of natural sizes."""
         stiffness, mass = in_units(self.system, self.matrix, mass, self.solver.sizes)
         return gathered(stiffness).real, gathered(mass).real
-
-    def asymmetry(self) -> tuple[int, float]:
-        """Rank of the non-symmetric part of the tangent matrix, and its largest entry relative to the matrix's."""
-        matrix = self._in_units(self.mass)[0]
-        size = abs(matrix).sum(axis=1).max()
-        part = (matrix.T - matrix).tocoo()
-        counted = abs(part.data) > NEGLIGIBLE * size
-        rows, row = np.unique(part.row[counted], return_inverse=True)
-        columns, column = np.unique(part.col[counted], return_inverse=True)
-        small = np.zeros((len(rows), len(columns)))
-        small[row, column] = part.data[counted]
-        return (int(np.linalg.matrix_rank(small)), float(abs(small).max() / size)) if len(rows) else (0, 0.0)
 
     def inverse(self, target: float) -> Spectrum:
         """The pencil on its unknowns with mass, about a shift; :class:`ConvergenceError` if it is singular there."""

@@ -66,11 +66,7 @@ def least_eigenvalue(system: System) -> float:
 
 
 def assemble_pencil(system: System, x: PETSc.Vec, matrix: PETSc.Mat, mass: PETSc.Mat) -> State:
-    """Assemble tangent ``matrix`` and kinetic ``mass`` of a ``system`` at the state ``x``, without phase conditions.
-
-    Returns the state.  Raises :class:`SceneError` for a rod without any inertia, :class:`ConvergenceError` where one
-    that depends on the load is negative or vanishes.
-    """
+    """Assemble tangent ``matrix`` and kinetic ``mass`` of a ``system`` at the state ``x``, without phase conditions."""
     if system.equations.massless:
         raise SceneError("A rod without inertia has no eigenvalues mu = omega^2: give it a mass or a rotary inertia.")
     if system.scene.inertia_depends_on_load and (trouble := trouble_with_inertia(system.scene, system.scalar(x))):
@@ -111,10 +107,7 @@ def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
 def weighed_modes(
     system: System, modes: dict[int, PETSc.Vec], mass: PETSc.Mat
 ) -> dict[int, tuple[PETSc.Vec, PETSc.Vec]]:
-    """Basis ``g`` of the symmetry modes that is orthonormal in the mass, and ``M g``.
-
-    What moves nothing that has inertia is orthonormal in the metric instead, with the metric's product.
-    """
+    """Basis ``g`` of the symmetry modes that is orthonormal in the mass, and ``M g``."""
     given, scaled = list(modes.values()), mass
     if not given:
         return {}

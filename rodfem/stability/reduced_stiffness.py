@@ -78,11 +78,7 @@ class Bordered:
         return out
 
     def factor(self, matrix: PETSc.Mat, columns: list[PETSc.Vec], rows: list[PETSc.Vec] | None = None) -> int:
-        """Factor with a matrix of the same pattern; its negative eigenvalues off the borders, -1 without a count.
-
-        The ``rows`` of the borders are the ``columns`` unless given.  Raises :class:`ConvergenceError` if it is
-        singular.
-        """
+        """Factor with a matrix of the same pattern; its negative eigenvalues off the borders, -1 without a count."""
         values = self._rows.data
         values[: self.own][~self._border] = local_rows(matrix).data.real
         local = [np.stack([v.array_r.real for v in side], axis=1) for side in (columns, rows or columns)]
@@ -109,10 +105,7 @@ class Bordered:
         return int(rest)
 
     def solve(self, columns: Sequence[PETSc.Vec] = ()) -> tuple[list[PETSc.Vec], np.ndarray]:
-        """Solutions for ``(column, 0)``, then for a unit on each border: vectors, and multipliers (k, number of these).
-
-        They have one step of iterative refinement.
-        """
+        """Solutions for ``(column, 0)``, then for a unit on each border: vectors, and multipliers (k, number)."""
         right = np.zeros((self._rows.shape[0], len(columns) + self.k))
         inner = len(right) - self.extra
         for i, column in enumerate(columns):

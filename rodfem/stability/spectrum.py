@@ -294,11 +294,7 @@ class _Operator:
 
 
 def krylov(apply: Solve, size: int, number: int, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """The ``number`` greatest eigenvalues, and vectors, of a real matrix (``size``, ``size``) known by ``apply``.
-
-    The Krylov space begins with ``start`` (size,), or with any vector.  Options of SLEPc begin with ``rodfem_``; raises
-    :class:`~rodfem.errors.ConvergenceError` where it finds none.
-    """
+    """The ``number`` greatest eigenvalues, and vectors, of a real matrix (``size``, ``size``) known by ``apply``."""
     matrix = PETSc.Mat().createPython((size, size), _Operator(apply), comm=PETSc.COMM_SELF)
     matrix.setUp()
     solver = SLEPc.EPS().create(PETSc.COMM_SELF)

@@ -108,10 +108,7 @@ class SymmetricSolver(PencilMatrices):
         self.factorisations += 1
 
     def leftmost(self, number: int) -> Eigenvalues:
-        """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer.
-
-        More are computed where a count finds any missing: a Krylov method finds the second of two equal ones late.
-        """
+        """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer."""
         with self.system.clock("stability"):
             modes = self._solve(number, 1) if len(self.last) else None
             if modes is None or not modes.certified:
@@ -193,10 +190,7 @@ class SymmetricSolver(PencilMatrices):
         return Eigenvalues(values[:number], vectors[:number], errors[:number], self.eigenvalue_count(cut) == known)
 
     def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
-        """``number`` eigenvalues or all there are, with vectors and backward errors, without what is no eigenpair.
-
-        More than there are finite ones break the Krylov space down.
-        """
+        """``number`` eigenvalues or all there are, with vectors and backward errors, without what is no eigenpair."""
         start = self.inertia.seed(1)
         if len(self.last):
             start.scale(1e-6 / self.system.norm(start))  # a space that is invariant already would miss all else

@@ -140,7 +140,7 @@ def test_a_stale_pencil_refuses() -> None:
     found = first.nearest(2, 0.0)
     second = vibration.at(y)
     assert second.nearest(2, 0.0).values != pytest.approx(found.values, rel=1e-3)
-    for ask in (lambda: first.nearest(2, 0.0), lambda: first.weighed(found.vectors), first.asymmetry):
+    for ask in (lambda: first.nearest(2, 0.0), lambda: first.weighed(found.vectors)):
         with pytest.raises(RuntimeError, match="another state"):
             ask()
     assert first.motion(found.vectors[:, :1]) == vibration.at(y).motion(found.vectors[:, :1])
