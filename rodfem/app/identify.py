@@ -8,9 +8,11 @@ the deviations are not known (m data, n unknowns).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,7 +28,7 @@ from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.state import line
 from rodfem.output.words import number
-from rodfem.problem.arguments import checked
+from rodfem.problem.arguments import Check, checked, each
 from rodfem.problem.field import Field, names, with_fields
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
@@ -40,6 +42,7 @@ WIDTHS = {CRITICAL: 1, ORDINATE: 2, SHAPE: 5}
 """Numbers in a row of each."""
 BLIND = 1e-9
 """Least singular value of the Jacobian in sizes of the first guess, over the largest: less is not determined."""
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 Rows = tuple[np.ndarray, np.ndarray]
 
 
@@ -64,10 +67,16 @@ class Identified:
         return f"<Identified: {each}>"
 
 
-@checked(scene=SCENE, discretization=MESH)
+def _one_or_more(check: Check) -> Check:
+    """Check of what is given by itself, or in a list."""
+    several = each(check)
+    return lambda name, given: [*several(name, given)] if isinstance(given, (list, tuple)) else check(name, given)
+
+
+@checked(scene=_one_or_more(SCENE), discretization=MESH)
 def identify(
-    scene: Scene,
-    data: Mapping[str, Any],
+    scene: Scene | Sequence[Scene],
+    data: Mapping[str, Any] | Sequence[Mapping[str, Any]],
     unknown: Sequence[str] | Mapping[str, Field],
     deviations: Mapping[str, float] | None = None,
     discretization: Discretization | None = None,
@@ -75,32 +84,47 @@ def identify(
     """Constants of a ``scene``, or fields in their place, for which it fits what was measured best.
 
     ``data`` has at least one of ``"critical loads"``: those at which the index of the first branch grows, in their
-    order; ``"ordinate"``: rows of load and ordinate; ``"shape"``: rows of load, arclength and position.  States are
-    followed from the first load of the data on, without jumps, on the mesh of the ``discretization``.  ``unknown`` are
-    names of constants, whose values are the first guess, or :class:`~rodfem.Field` by name.  ``deviations`` are
-    standard deviations of the data by kind; if they are not given those of one kind are alike, and of several relative
-    to their largest datum.  Raises :class:`~rodfem.errors.InputError` for data and names that make no sense, and
+    order; ``"ordinate"``: rows of load and ordinate; ``"shape"``: rows of load, arclength and position; each as rows,
+    or as the path of a text file with a row in each line.  Of several experiments with one rod ``scene`` and ``data``
+    are lists.  States are followed from the first load of the data on, without jumps, on the mesh of the
+    ``discretization``.  ``unknown`` are names of constants, whose values are the first guess, or
+    :class:`~rodfem.Field` by name.  ``deviations`` are standard deviations of the data by kind; if they are not given
+    those of one kind are alike, and of several relative to their largest datum.  Raises
+    :class:`~rodfem.errors.InputError` for data and names that make no sense, and
     :class:`~rodfem.errors.ConvergenceError` for what the data do not determine.
     """
-    tables, fields = _tables(data, deviations), dict(unknown) if isinstance(unknown, Mapping) else {}
-    rod, chosen = with_fields(scene, fields), [n for name, field in fields.items() for n in names(name, field)]
-    model = _Model(rod, chosen or list(unknown), tables, discretization or Discretization())
-    sizes = {kind: float(abs(table[:, -1]).max()) if len(tables) > 1 else 1.0 for kind, table in tables.items()}
-    weights = np.repeat([(deviations or sizes)[kind] for kind in tables], [*map(model.count, tables)])
-    return _fitted(model, weights, known=bool(deviations))
+    scenes, every = [scene] if isinstance(scene, Scene) else [*scene], [data] if isinstance(data, Mapping) else [*data]
+    if not len(scenes) == len(every) > 0:
+        raise InputError(f"There are {len(scenes)} scenes and {len(every)} sets of data: give one for each.")
+    fields = dict(unknown) if isinstance(unknown, Mapping) else {}
+    chosen = [n for name, field in fields.items() for n in names(name, field)] or list(unknown)
+    mesh, tables = discretization or Discretization(), [_tables(one, deviations) for one in every]
+    models = [_Model(with_fields(rod, fields), chosen, own, mesh) for rod, own in zip(scenes, tables, strict=True)]
+    kinds = dict.fromkeys(kind for own in tables for kind in own)
+    largest = {kind: max(float(abs(own[kind][:, -1]).max()) for own in tables if kind in own) for kind in kinds}
+    sizes = deviations or (largest if len(kinds) > 1 else dict.fromkeys(kinds, 1.0))
+    weights = [np.full(model.count(kind), sizes[kind]) for model in models for kind in model.tables]
+    return _fitted(models, np.concatenate(weights), known=bool(deviations))
 
 
-def _fitted(model: _Model, weights: np.ndarray, *, known: bool) -> Identified:
+def _fitted(models: Sequence[_Model], weights: np.ndarray, *, known: bool) -> Identified:
     """Least squares of the residuals over their ``weights`` (m,), which are their deviations if these are ``known``."""
     from scipy.optimize import least_squares
 
-    rod, chosen, exact = model.scene, model.chosen, float(np.finfo(float).eps) ** 0.8
+    rod, chosen, exact = models[0].scene, models[0].chosen, float(np.finfo(float).eps) ** 0.8
+
+    def residuals(p: np.ndarray) -> np.ndarray:
+        return np.concatenate([model.at(p)[0] for model in models]) / weights
+
+    def slopes(p: np.ndarray) -> np.ndarray:
+        return np.concatenate([model.at(p)[1] for model in models]) / weights[:, None]
+
     guess = np.array([rod.parameters[n].value for n in chosen])
     size = np.where(guess, abs(guess), 1.0)
     answer = least_squares(
-        lambda p: model.at(p)[0] / weights,
+        residuals,
         guess,
-        lambda p: model.at(p)[1] / weights[:, None],
+        slopes,
         bounds=tuple(np.transpose([rod.parameters[n].admissible for n in chosen])),
         x_scale=size,
         **dict.fromkeys(("xtol", "ftol", "gtol"), exact),
@@ -110,7 +134,22 @@ def _fitted(model: _Model, weights: np.ndarray, *, known: bool) -> Identified:
         covariance = covariance * (2 * answer.cost / free if free else np.nan)
     found = dict(zip(chosen, answer.x.tolist(), strict=True))
     errors = dict(zip(chosen, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    return Identified(rod.varying(**found), found, errors, covariance, answer.fun * weights, model.points(found))
+    points = [point for model in models for point in model.points(found)]
+    return Identified(rod.varying(**found), found, errors, covariance, answer.fun * weights, points)
+
+
+def _read(rows: Any) -> Any:
+    """Rows of a file, whose numbers are between blanks, commas or semicolons; other lines, as its head, are left out.
+
+    Raises :class:`InputError` for one that cannot be read.
+    """
+    if not isinstance(rows, (str, Path)):
+        return rows
+    try:
+        lines = [re.split(r"[\s,;]+", line.strip(" \t\r,;")) for line in Path(rows).read_text().splitlines()]
+    except (OSError, UnicodeDecodeError) as trouble:
+        raise InputError(f"The data in {rows} cannot be read ({trouble}): give the path of a text file.") from trouble
+    return [[float(x) for x in line] for line in lines if all(NUMBER.fullmatch(x) for x in line)]
 
 
 def _tables(data: Mapping[str, Any], deviations: Mapping[str, float] | None) -> dict[str, np.ndarray]:
@@ -119,6 +158,7 @@ def _tables(data: Mapping[str, Any], deviations: Mapping[str, float] | None) -> 
     for kind, rows in data.items():
         if kind not in WIDTHS:
             raise InputError(f"Data of the kind {kind!r} are not known: choose one of {', '.join(WIDTHS)}.")
+        rows = _read(rows)
         try:
             out[kind] = np.array(rows, dtype=float).reshape(-1, WIDTHS[kind])
         except (TypeError, ValueError):

@@ -1,6 +1,7 @@
 """Constants from what was measured, of closed forms with and without noise."""
 
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -52,6 +53,33 @@ def test_stiffness_and_natural_curvature_from_a_curve() -> None:
     sigma = 1e-3 * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
     assert [again.errors["B"], again.errors["K"]] == pytest.approx(sigma, rel=0.05)
     assert abs(again.values["B"] - B) < 3 * sigma[0] and abs(again.values["K"] - K) < 3 * sigma[1]
+
+
+def test_standard_errors_are_those_of_repeated_measurements(tmp_path: Path) -> None:
+    """Of 16 curves in files, with noise of a size that is not told, estimates scatter by as much as they say."""
+    M, B, K = np.linspace(0.2, 2.6, 7), 2.0, 0.4
+    noise, off, told = np.random.default_rng(5), [], []
+    for _ in range(16):
+        rows = np.column_stack([M, deflection(M / B + K) + 1e-3 * noise.standard_normal(len(M))])
+        np.savetxt(tmp_path / "curve.csv", rows, delimiter=", ", header="couple, deflection")
+        found = rodfem.identify(arc().varying(B=1.9, K=0.3), {"ordinate": tmp_path / "curve.csv"}, ("B", "K"))
+        off.append([found.values["B"] - B, found.values["K"] - K])
+        told.append([found.errors["B"], found.errors["K"]])
+    assert 0.5 < np.mean(np.square(np.array(off) / told)) < 1.6  # of 32 squares, one but for a quarter
+    with pytest.raises(InputError, match="give the path of a text file"):
+        rodfem.identify(arc(), {"ordinate": tmp_path / "none.csv"}, ("B",))
+
+
+def test_several_experiments_with_one_rod() -> None:
+    """Each alone has one load and determines one constant: two have both."""
+    rods, loads = [arc(), arc()], (0.6, 2.2)
+    data = [{"ordinate": [[M, deflection(M / 2.0 + 0.4)]]} for M in loads]
+    found = rodfem.identify(rods, data, ("B", "K"))
+    assert [found.values["B"], found.values["K"]] == pytest.approx([2.0, 0.4], abs=1e-6) and len(found.points) == 2
+    with pytest.raises(ConvergenceError, match="do not determine"):
+        rodfem.identify(rods[0], data[0], ("B", "K"))
+    with pytest.raises(InputError, match="2 scenes and 1 sets of data"):
+        rodfem.identify(rods, data[:1], ("B",))
 
 
 def test_natural_curvature_for_a_wanted_shape() -> None:
