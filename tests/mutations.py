@@ -197,7 +197,7 @@ TABLE = {
             "noise.of_discriminant + clear.split) /", "noise.of_discriminant) /", HARD),
     },
     "rodfem/diagram/critical_loads.py": {
-        "pairs-that-have-just-met-enter": ("if D > 0 or just_met:", "if D > 0:", "diagram/test_flutter_at_a_row.py"),
+        "pairs-that-have-just-met-enter": ("if D > 0 or just_met:", "if D > 0:", HARD),
         "frequencies-that-meet-and-part-in-a-step": (
             "for meeting in sorted(ahead,", "for meeting in sorted(ahead[:0],", HARD),
         "two-that-cross-may-meet": (
@@ -206,7 +206,7 @@ TABLE = {
         "divergence-numbered-across-collisions": (
             "if passed and not negative:", "if passed:", "literature/test_rods.py"),
         "divergence-of-rigid-motions": ("[self._zeros :]", "[0:]", "literature/test_free_rods.py"),
-        "steps-are-not-parted": ("if self._parted == PARTS or", "if True or", "diagram/test_close_critical_loads.py"),
+        "steps-are-not-parted": ("if self._parted == PARTS or", "if True or", "literature/test_rods.py " + HARD),
         "a-pole-next-to-another-eigenvalue-is-a-divergence": (
             "min(abs(mu(low)), abs(mu(high))) / 2,", "min(abs(mu(low)), abs(mu(high))),",
             "diagram/test_light_and_slow_rods.py"),
@@ -250,7 +250,7 @@ TABLE = {
             "(others if self.solver.lost_convexity(point.x) else convex).append(point)", "convex.append(point)",
             "continuation/test_convexity.py"),
         "what-comes-back-is-known-by-its-last-rows": (
-            "max(min(rows, len(parent.points) - TAIL), 0)", "len(parent.points) - TAIL", CHAIN),
+            "max(min(rows, len(parent.points) - TAIL), 0)", "len(parent.points) - TAIL", "diagram/test_golden.py"),
     },
     "rodfem/diagram/saved.py": {
         "a-read-diagram-forgets-its-plan": (

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from classics import ON_AXIS, RIGID, column, explore, push
 from closed_form_hemitropic import loads as buckling_loads
-from hard.two_freedoms import scene as two_freedoms
 
 from rodfem import (
     Discretization,
@@ -55,33 +54,6 @@ def test_a_mesh_too_coarse_for_the_turns_of_a_rod_is_told(elements: int, told: b
     diagram = trace(localised(), Discretization("reduced", elements, 6), plan)
     assert any(f"on {elements} elements and" in warning for warning in diagram.warnings) == told
     assert (diagram[0].points[0].negative == 0) != told
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize(("apart", "most"), [(3e-3, 4.0), (1e-6, 4.0), (1e-6, 40.0)])
-def test_neighbours_in_one_step(apart: float, most: float) -> None:
-    """A column that bends almost alike about both axes: (2n - 1)^2 pi^2 B/4, each with its own index on either side.
-
-    Over the wider range the first two are one place, by their arclengths: their null vectors tell them apart.
-    """
-    scene = column(
-        "neighbours", (clamped(), free(push)), (0.0, most), constants={"B1": 1.0, "B2": 1.0 + apart}
-    )  # fmt: skip
-    found = explore(scene).special()
-    expected = [load * B for load in (EULER, 9 * EULER) for B in (1.0, 1.0 + apart) if load < most]
-    assert [s.point.load for s in found] == pytest.approx(expected, abs=1e-11)
-    assert [(s.negative_before, s.negative_after) for s in found] == [(n, n + 1) for n in range(len(expected))]
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("half", [1e-6, 1e-5, 1e-3])
-def test_a_range_about_the_buckling_load(half: float) -> None:
-    """The eigenvalue that vanishes is within the tolerance of zero at every row but the ends."""
-    scene = column("range", (clamped(), free(push)), (EULER - half, EULER + half))
-    found = explore(scene)
-    (special,) = found.special()
-    assert special.point.load == pytest.approx(EULER, abs=1e-11)
-    assert (special.negative_before, special.negative_after) == (0, 1)
 
 
 def test_bars_of_a_double_point_hold_for_both_loads() -> None:
@@ -134,24 +106,6 @@ def test_a_pair_of_crossings_beside_an_end_of_a_range(low: float, high: float, l
     assert [s.point.load for s in found] == pytest.approx(expected, abs=1e-9)
     assert [(s.negative_before, s.negative_after) for s in found[-2:]] == [(2, 4), (4, 2)]
     assert not straight.unexplained
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize(("slope", "largest"), [(2.8, 0.3), (-2.2, 0.15)])
-def test_a_pair_of_crossings_that_no_parabola_shows(slope: float, largest: float) -> None:
-    """The eigenvalue ``(P^2 - d^2)(1 + slope P)``: the parabola through three rows has its vertex too high, or in the
-    step beside, and the second one may be off by more than the first.
-    """
-    apart = 1e-3
-    model = two_freedoms(
-        lambda u, f2, c: 0.6 * u**2 + 0.5 * (c.P * c.P - c.a) * (1 + c.b * c.P) * f2 + 0.1 * f2**2,
-        (-0.31, 0.4), a=apart**2 / 4, b=slope,
-    )  # fmt: skip
-    plan = Plan(depth=0, steps=StepControl(first=largest / 2, largest=largest), error_bars=False)
-    (branch,) = trace(model, Discretization("reduced", 4, 3), plan)
-    found = [s for s in branch.special if s.kind == BRANCH_POINT]
-    assert [(s.negative_before, s.negative_after) for s in found] == [(0, 1), (1, 0)]
-    assert [s.point.load for s in found] == pytest.approx([-apart / 2, apart / 2], abs=1e-10)
 
 
 def test_what_is_not_explained_is_kept() -> None:

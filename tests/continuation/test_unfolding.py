@@ -73,30 +73,6 @@ def fold_of(lateral: float) -> float:
     return float(found.fun)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("lateral", [1e-3, 1e-6, 1e-9, 1e-12])
-def test_both_pieces_of_a_broken_pitchfork(lateral: float) -> None:
-    """The first branch is stable all along; the detached one has a fold, and no branch point is left.
-
-    Folds as recorded by an independent program: 2.48237448836, 2.46755109761, 2.46740260027 for 1e-3, 1e-6, 1e-9.
-    """
-    found = diagram(cantilever(lateral))
-    first = found.branches[0]
-    assert {p.negative for p in first.points} == {0}
-    assert [s.kind for s in first.special] == ["end"]
-    tip = first.points[-1].ordinate
-    assert len(found.branches) == 2
-    detached = found.branches[1]
-    (fold,) = [s for s in detached.special if s.kind in (FOLD, BRANCH_POINT, IMPERFECT)]
-    assert fold.kind == FOLD
-    assert fold.point.load == pytest.approx(fold_of(lateral), abs=2e-11)
-    assert {fold.negative_before, fold.negative_after} == {0, 1}
-    assert not detached.unexplained
-    against = min(p.ordinate for p in detached.points)
-    assert against == pytest.approx(-tip, abs=10 * lateral + 1e-9)
-    assert {round(p.load, 9) for p in (detached.points[0], detached.points[-1])} == {4.0}
-
-
 def test_a_jump_at_which_nothing_can_be_located_is_one_across_a_gap(lateral: float = 2e-4) -> None:
     """Long steps end on the other branch, and shorter ones after them do not: the gap is known from the first."""
     found = diagram(cantilever(lateral), steps=StepControl(first=0.05, largest=0.3))

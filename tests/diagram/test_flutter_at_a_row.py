@@ -33,22 +33,6 @@ def without(share: float, strong: float) -> Found:
     return critical(swept(share, strong, (2.0, 35.0)))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("off", "back"), [(0.0, False), (4e-13, True), (-4e-13, True)])
-@pytest.mark.parametrize(("share", "strong", "which"), [(1.0, 1.5, 1), (0.4, 10.0, 3)])
-def test_a_load_that_is_asked_for_at_a_flutter_load(
-    share: float, strong: float, which: int, back: bool, off: float
-) -> None:
-    """A pair that is complex by round-off at one end of a step, and real at the row, was lost between the two."""
-    known = without(share, strong)
-    assert known[which][0] == str(FLUTTER)
-    diagram = swept(share, strong, (35.0, 2.0) if back else (2.0, 35.0), known[which][1] * (1 + off))
-    expected = [(kind, load, *(numbers[::-1] if back else numbers)) for kind, load, *numbers in known]
-    for one, other in zip(critical(diagram), expected, strict=True):
-        assert (one[0], *one[2:]) == (other[0], *other[2:]) and one[1] == pytest.approx(other[1], rel=1e-11)
-    assert not diagram.warnings and not diagram[0].unexplained
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("share", "strong", "which", "to"), [(1.0, 1.5, 0, 25.0), (1.0, 1.5, 1, 25.0), (0.4, 10.0, 3, 4.0)]

@@ -6,11 +6,11 @@ from io import StringIO
 import classics
 import numpy as np
 import pytest
-from closed_forms import column, double, flutter
+from closed_forms import column, flutter
 from hemitropic_cases import specials
 from scipy.optimize import brentq
 
-from rodfem import Branch, Discretization, End, Inertia, Ordinate, Plan, Scene, Solver, compat, free, trace
+from rodfem import Branch, Discretization, End, Ordinate, Plan, Scene, Solver, compat, free, trace
 from rodfem.app.terminal import Report
 from rodfem.errors import ConvergenceError
 from rodfem.forms.energy import bending_and_twist
@@ -129,32 +129,6 @@ def test_a_load_that_the_richer_mesh_does_not_find_has_no_bar(monkeypatch: pytes
     (point,) = specials(diagram[0], "flutter")
     assert np.isnan([point.error_estimate, point.ordinate_error]).all()
     assert any("No error of the flutter" in sentence for sentence in diagram.warnings)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("twisting", [1e-3, 1e-4])
-@pytest.mark.usefixtures("few_loads")
-def test_flutter_among_dozens_of_slow_motions(twisting: float) -> None:
-    """A rod that is so soft in torsion that dozens of motions are slower than those that flutter, at Beck's load.
-
-    Of the softer one they are 5e5 times slower.
-    """
-    beck = classics.beck(span=(19.0, 22.0))
-    scene = replace(
-        beck,
-        parameters={**beck.parameters, "C": twisting},
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 10.0, c.C)),
-        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0)),
-    )
-    mesh = Discretization("pointwise", 4, 6)
-    found = trace(scene, mesh, Plan())
-    (flutter,) = specials(found[0], "flutter")
-    assert abs(flutter.point.load - double(20.0, 120.0)[0]) <= flutter.error_estimate < 1e-9
-    assert not found.warnings
-    for method in ("auto", "dense", "shift-invert"):
-        assert [found.assess(found[0].points[row], method).negative for row in (0, -1)] == [0, 2]
-    (state,) = found.at(22.0)
-    assert (state.negative, state.stable) == (2, False)
 
 
 def test_what_petsc_keeps_of_matrices_is_destroyed(monkeypatch: pytest.MonkeyPatch) -> None:

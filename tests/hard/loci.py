@@ -7,8 +7,8 @@ from typing import Any
 
 import classics
 import numpy as np
-from diagram.test_close_critical_loads import BECK
 from hard.case import Measured, run
+from hard.thrusts import BECK
 from hard.two_freedoms import scene as two_freedoms
 
 from rodfem import Diagram, Discretization, Locus, Parameter, StepControl, clamped, free

@@ -4,17 +4,20 @@ The thrust on a column is a parabola in a parameter, and at its greatest about a
 critical of the column is known: flutter of Beck's, divergence of one whose thrust follows the tip in part.
 """
 
-from math import inf, sqrt
+from math import acos, inf, sqrt
 from typing import Any
 
 import classics
-from diagram.test_close_critical_loads import BECK, DIVERGES, FLUTTERS, SHARE
+from closed_forms import double, flutter
 from hard.case import Change, Measured, compare, run, said
 
 from rodfem import Diagram, Discretization, End, Inertia, Scene, clamped, free
 from rodfem.forms import loads as springs
 
 MESH = Discretization("pointwise", 4, 6)
+BECK, SHARE = float(double(20.0, 120.0)[0]), 0.4
+"""Beck's load; the share of a thrust that follows a tip, which diverges, comes back, and flutters."""
+DIVERGES, FLUTTERS = acos(-SHARE / (1 - SHARE)) ** 2, flutter(SHARE, 16.4, 21.5)[0]
 AT_ROW, BETWEEN = 5.0, 5.0371
 """Values of the parameter: one of a row of the sweep, and one between two rows."""
 CRITICAL = {"flutter": (BECK, 1.0), "divergence": (DIVERGES, SHARE), "late flutter": (FLUTTERS, SHARE)}
