@@ -67,20 +67,26 @@ def double(P: float, mu: float, J: float = 0.0) -> np.ndarray:
     return fsolve(equations, [P, mu], xtol=1e-13)
 
 
-def tip(mu: complex, P: float, share: float) -> complex:
-    """Zero at the eigenvalues of ``w'''' + P w'' = mu w`` under a thrust, a ``share`` of which follows the tip."""
-    A = np.eye(4, k=1, dtype=complex)
-    A[3, 0], A[3, 2] = mu, -P
-    y = expm(A)[:, 2:]
-    return complex(np.linalg.det(np.array([y[2], y[3] + (1 - share) * P * y[1]])))
+def tip(
+    mu: complex, P: float, share: float = 1.0, spring: float = 0.0, mass: float = 0.0, middle: float = 0.0
+) -> complex:
+    """Zero at the eigenvalues of ``w'''' + P w'' = mu w`` under a thrust, a ``share`` of which follows the tip.
+
+    There is a ``spring`` across the tip, and a ``mass`` at it and in the ``middle``.
+    """
+    A, passed = np.eye(4, k=1, dtype=complex), np.eye(4, dtype=complex)
+    A[3, 0], A[3, 2], passed[3, 0] = mu, -P, mu * middle
+    half = expm(A / 2)
+    y = (half @ passed @ half)[:, 2:]
+    return complex(np.linalg.det([y[2], y[3] + (1 - share) * P * y[1] + (mu * mass - spring) * y[0]]))
 
 
-def flutter(share: float, P: float, mu: float) -> tuple[float, float]:
+def flutter(P: float, mu: float, **column: float) -> tuple[float, float]:
     """Load and eigenvalue at which two of them meet, from about ``P``, ``mu``."""
 
     def equations(z: np.ndarray) -> list[float]:
         h = 1e-20
-        return [tip(z[1], z[0], share).real, tip(complex(z[1], h), z[0], share).imag / h]
+        return [tip(z[1], z[0], **column).real, tip(complex(z[1], h), z[0], **column).imag / h]
 
     found = fsolve(equations, [P, mu], xtol=1e-13)
     return float(found[0]), float(found[1])

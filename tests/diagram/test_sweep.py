@@ -76,7 +76,7 @@ def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> N
     """A thrust that follows in part: one plane diverges, holds again and flutters, before the other one diverges."""
     share, strong = 0.45, 3.0
     _, data, _ = swept(classics.partly_following(share, (0.0, 30.0), strong), monkeypatch)
-    first, meet = np.arccos(-share / (1 - share)), flutter(share, 16.1, 37.0)[0]
+    first, meet = np.arccos(-share / (1 - share)), flutter(16.1, 37.0, share=share)[0]
     expected = [
         ("range of divergence", first**2, (2 * np.pi - first) ** 2),
         ("range of flutter", meet, strong * first**2),

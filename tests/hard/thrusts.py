@@ -17,7 +17,7 @@ from rodfem.forms import loads as springs
 MESH = Discretization("pointwise", 4, 6)
 BECK, SHARE = float(double(20.0, 120.0)[0]), 0.4
 """Beck's load; the share of a thrust that follows a tip, which diverges, comes back, and flutters."""
-DIVERGES, FLUTTERS = acos(-SHARE / (1 - SHARE)) ** 2, flutter(SHARE, 16.4, 21.5)[0]
+DIVERGES, FLUTTERS = acos(-SHARE / (1 - SHARE)) ** 2, flutter(16.4, 21.5, share=SHARE)[0]
 AT_ROW, BETWEEN = 5.0, 5.0371
 """Values of the parameter: one of a row of the sweep, and one between two rows."""
 CRITICAL = {"flutter": (BECK, 1.0), "divergence": (DIVERGES, SHARE), "late flutter": (FLUTTERS, SHARE)}

@@ -5,6 +5,7 @@ from math import cos, pi, sin, sqrt, tan
 from typing import Any
 
 import classics
+import closed_forms
 import numpy as np
 import pytest
 from classics import FORMULATIONS, column, explore, sweep
@@ -312,21 +313,7 @@ def test_hanging_cable(planar: str | None) -> None:
     assert misses[0] / misses[1] == pytest.approx(10.0, rel=0.05)
 
 
-# --- a material that loses its convexity ----------------------------------------------------------------------------
-
-
 # --- loads without a potential --------------------------------------------------------------------------------------
-
-
-def cantilever(mu: complex, P: float, tip: float, middle: float) -> complex:
-    """Zero at the eigenvalues: ``w'''' + P w'' = mu w``, with jumps of the shear force at masses."""
-    A = np.eye(4, k=1, dtype=complex)
-    A[3, 0], A[3, 2] = mu, -P
-    mass = np.eye(4, dtype=complex)
-    mass[3, 0] = mu * middle
-    half = expm(A / 2)
-    y = (half @ mass @ half)[:, 2:]
-    return complex(np.linalg.det(np.array([y[2], y[3] + mu * tip * y[0]])))
 
 
 @pytest.mark.few(1)
@@ -346,12 +333,7 @@ def test_flutter_with_masses(
     scene = classics.beck(tip, middle, span)
     assert not scene.conservative
     (flutter,) = sweep(scene).special("flutter")
-
-    def equations(x: np.ndarray) -> list[float]:
-        h = 1e-20
-        return [cantilever(x[1], x[0], tip, middle).real, cantilever(complex(x[1], h), x[0], tip, middle).imag / h]
-
-    P, mu = fsolve(equations, about or (flutter.point.load, flutter.omega2), xtol=1e-13)
+    P, mu = closed_forms.flutter(*(about or (flutter.point.load, flutter.omega2)), mass=tip, middle=middle)
     assert (flutter.point.load, flutter.omega2) == pytest.approx((P, mu), rel=1e-9)
     assert (flutter.negative_before, flutter.negative_after) == (0, 2)
 

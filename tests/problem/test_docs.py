@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from literature.test_classics import CRITICAL, TORQUE, cantilever, root
+from closed_forms import flutter
+from literature.test_classics import CRITICAL, TORQUE, root
 from problem.test_tables import buckling
 from rows import verify
 from scipy.linalg import expm
-from scipy.optimize import fsolve
 from scipy.special import ellipe, ellipk
 from shooting_solver import Problem, Rod
 
@@ -59,16 +59,6 @@ def coiled_tip(k0: float, tension: float) -> float:
     for p[2] in np.linspace(0.0, tension, 6):
         p, end = problem.solve(p)
     return float(np.hypot(*end[7:9]))
-
-
-def pflueger() -> float:
-    """Flutter load of a cantilever with a mass at its tip: a double root of its frequency equation."""
-
-    def equations(x: np.ndarray) -> list[float]:
-        h = 1e-20
-        return [cantilever(x[1], x[0], 1.0, 0.0).real, cantilever(complex(x[1], h), x[0], 1.0, 0.0).imag / h]
-
-    return float(fsolve(equations, (16.0, 40.0), xtol=1e-13)[0])
 
 
 TANGENT = TORQUE / 2
@@ -117,7 +107,7 @@ def expected() -> dict[str, list[float]]:
         "heavy": CRITICAL["heavy"][3],
         "winkler": CRITICAL["foundation"][3],
         "midway": CRITICAL["point load"][3],
-        "pflueger": [pflueger()],
+        "pflueger": [flutter(16.0, 40.0, mass=1.0)[0]],
         "leipholz": [40.0537365149],
         "torque": [1000 * (pi / 998) / cos(pi / 998)],
         "on_a_plane": [pi**2 / 2, TANGENT**2],
