@@ -40,31 +40,6 @@ DIFFERENCES = [(1e-3 * step, weight / 2e-3) for step, weight in SHARP]
 """Places and weights of a central difference of the fourth order: along a null vector, in a parameter over its size."""
 
 
-def adjoint(
-    solver: BranchSolver, x: PETSc.Vec, states: SingularSystem
-) -> tuple[list[PETSc.Vec], list[list[PETSc.Vec]]]:
-    """Null vectors at a solution of ``states``; ``y`` (k, k), ``S y_ij = -D(S v_i) v_j`` across them, not at folds."""
-    inertia, bordered = solver.inertia, bordered_of(solver.inertia, len(states.phi))
-    bordered.factor(inertia.at(x).matrix, states.phi)
-    V, G = bordered.solve()
-    Z, N = states.split(G)
-    null = [combine(V, z) for z in Z.T]
-    if states.fold:
-        return null, []
-    images = [[solver.system.new_vector() for _ in null] for _ in null]
-    for v, row in zip(null, images, strict=True):
-        for step, weight in SHARP:
-            matrix = inertia.moved(x + v * (step * DIFFERENCE)).matrix
-            for image, other in zip(row, null, strict=True):
-                image.axpy(weight / (2 * DIFFERENCE), states.image(matrix, other))
-
-    def across(image: PETSc.Vec) -> PETSc.Vec:
-        (y, *_), forces = bordered.solve([-image])
-        return combine([y, *V], np.array([1.0, *(N @ states.rest(N, G, -forces[:, 0]))]))
-
-    return null, [[across(image) for image in row] for row in images]
-
-
 class Adjoint:
     """Null vectors of a located fold or branch point ``x`` on a mesh, and all that its derivatives have in common."""
 
@@ -72,11 +47,39 @@ class Adjoint:
         """Take the null vectors at ``x``, a solution of ``states``."""
         self.solver, self.system, self.x, self.fold = solver, solver.system, x, states.fold
         self.values = dict(zip(self.system.scene.parameters, self.system.line.origin.tolist(), strict=True))
-        self.null, self.y = adjoint(solver, x, states)
-        matrix = solver.inertia.at(x).matrix
+        self.null, self.y, self._noise = list[PETSc.Vec](), list[list[PETSc.Vec]](), list[float]()
+        self._normalise(self._solve(states))
+
+    def _solve(self, states: SingularSystem) -> np.ndarray:
+        """Find the null vectors and ``y``, none at folds; returns ``R`` (k, k)."""
+        inertia, x = self.solver.inertia, self.x
+        at, bordered = inertia.at(x), bordered_of(inertia, len(states.phi))
+        column, matrix = at.border.copy(), at.matrix
+        bordered.factor(matrix, states.phi)
+        V, G = bordered.solve()
+        Z, N = states.split(G)
+        null = self.null = [combine(V, z) for z in Z.T]
         # rounding errors, independent, a hundred times, or all that is zero
-        self._noise = [100.0 * rounding(matrix, v, x) + 1e-15 * solver.inertia.scale for v in self.null]  # round-off
-        self._normalise(self._work(self.system.scene.load))
+        self._noise = [100.0 * rounding(matrix, v, x) + 1e-15 * inertia.scale for v in null]
+        if self.fold:
+            return np.array([[column.dot(null[0])]])
+        count = len(null)
+        images, rates = dict[tuple[int, int], PETSc.Vec](), np.zeros((count, count))
+        for i, v in enumerate(null):
+            for step, weight in SHARP:
+                there, share = inertia.moved(x + v * (step * DIFFERENCE)), weight / (2 * DIFFERENCE)
+                rates[i] += [share * there.border.dot(other) for other in null]
+                for j in range(i, count):
+                    images.setdefault((i, j), self.system.new_vector()).axpy(share, states.image(there.matrix, null[j]))
+
+        def across(image: PETSc.Vec) -> PETSc.Vec:
+            (y, *_), forces = bordered.solve([-image])
+            return combine([y, *V], np.array([1.0, *(N @ states.rest(N, G, -forces[:, 0]))]))
+
+        half = {pair: across(image) for pair, image in images.items()}
+        self.y = [[half[min(i, j), max(i, j)] for j in range(count)] for i in range(count)]
+        rates += [[y.dot(column) for y in row] for row in self.y]
+        return (rates + rates.T) / 2
 
     def _normalise(self, rates: np.ndarray) -> None:
         """Take null vectors by which ``R``, the ``rates`` (k, k), has plus or minus one on its diagonal."""
@@ -92,22 +95,17 @@ class Adjoint:
 
     def splitting(self, parameter: str) -> np.ndarray:
         """Matrix of splitting for a ``parameter``; raises :class:`ConvergenceError` for an imperfection."""
-        if not self.fold:
-            self._check(self._column(self.x, parameter), parameter)
-        return np.asarray(-self.signs[:, None] * self._work(parameter))
-
-    def _work(self, parameter: str) -> np.ndarray:
-        """``T`` (k, k) of a parameter, or of the load."""
         column = self._column(self.x, parameter)
         if self.fold:
-            return np.array([[column.dot(self.null[0])]])
+            return np.array([[-self.signs[0] * column.dot(self.null[0])]])
+        self._check(column, parameter)
         out = np.array([[y.dot(column) for y in row] for row in self.y])
         for v, row in zip(self.null, out, strict=True):
             h = DIFFERENCE / self.system.norm(v)
             for step, weight in SHARP:
                 there = self._column(self.x + v * (step * h), parameter)
                 row += [weight / (2 * h) * there.dot(other) for other in self.null]
-        return (out + out.T) / 2
+        return np.asarray(-self.signs[:, None] * (out + out.T) / 2)
 
     def _column(self, x: PETSc.Vec, parameter: str) -> PETSc.Vec:
         """Derivative of the equations in a parameter at ``x``; phase conditions stay."""

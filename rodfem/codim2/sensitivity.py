@@ -120,14 +120,25 @@ class Tolerance:
     __repr__ = __str__
 
 
-def tolerance(special: SpecialPoint, deviations: Mapping[str, float]) -> Tolerance:
-    """Deviations of the load of a special point by those of constants, to first order: ``|dlam/dp|`` times them."""
+def tolerance(special: SpecialPoint, deviations: Mapping[str, float | tuple[float, float]]) -> Tolerance:
+    """Deviations of the load of a special point by those of constants and fields, to first order: see its method."""
     known = special.point.own_solver.system.scene.parameters
-    if not all(deviation > 0.0 for deviation in deviations.values()):
-        raise InputError(f"deviations is {dict(deviations)}: give positive ones, as in {{'A': 0.02}}.")
-    slopes = {name: abs(derivative(special, name).value) for name in deviations}
-    parts = {known[name].words or name: deviations[name] * slope for name, slope in slopes.items()}
+    pairs = {name: np.append(given, [np.inf] * (2 - np.size(given))) for name, given in deviations.items()}
+    if not all(len(pair) == 2 and (pair > 0.0).all() for pair in pairs.values()):
+        raise InputError(
+            f"deviations is {dict(deviations)}: give positive ones, as in {{'A': 0.02, 'B': (0.02, 0.1)}}."
+        )
+    parts = {known[name].words or name: _deviation(special, name, *pair.tolist()) for name, pair in pairs.items()}
     return Tolerance(special.point.load, parts, special.error_estimate)
+
+
+def _deviation(special: SpecialPoint, name: str, size: float, length: float) -> float:
+    """Deviation of a load by one of this ``size`` that is correlated along the rod over a ``length``."""
+    found = derivative(special, name, along_the_rod=bool(np.isfinite(length)))
+    if not len(found.density):
+        return size * abs(found.value)
+    parts, middles = found.density * np.diff(found.ends), (found.ends[1:] + found.ends[:-1]) / 2
+    return size * float(np.sqrt(parts @ np.exp(-abs(middles[:, None] - middles) / length) @ parts))
 
 
 def adjoint_of(special: SpecialPoint) -> Adjoint:

@@ -300,10 +300,12 @@ class SpecialPoint:
         """The same of the coefficient of its :attr:`law`: how much more, or less, a bent rod carries."""
         return Point.sensitivity().coefficient_derivative(self, parameter)
 
-    def tolerance(self, deviations: Mapping[str, float]) -> Tolerance:
+    def tolerance(self, deviations: Mapping[str, float | tuple[float, float]]) -> Tolerance:
         """Standard deviation of its load by those of constants, ``{"A": 0.02}``, to first order; and the mesh's error.
 
-        Raises :class:`~rodfem.errors.InputError` for one that is not positive, and what :meth:`derivative` does.
+        Of a field that varies at random about a constant, with ``exp(-|s - t| / L)`` as correlation, it is a pair of
+        deviation and length ``L``, ``{"A": (0.02, 0.1)}``.  Raises :class:`~rodfem.errors.InputError` for one that is
+        not positive, and what :meth:`derivative` does.
         """
         return Point.sensitivity().tolerance(self, deviations)
 

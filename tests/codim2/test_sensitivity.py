@@ -1,6 +1,7 @@
 """Derivatives of critical loads, against closed forms and loads of other rods located."""
 
 import json
+from dataclasses import replace
 from math import pi
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import rodfem
-from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free, sliding
+from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free, pinned, sliding
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.forms.energy import bending_and_twist
 
@@ -90,6 +91,30 @@ def test_deviations_of_a_load() -> None:
     assert str(found).startswith("29.61 +- 0.89 (stiffness B), +- ") and str(found).endswith(" (mesh)")
     with pytest.raises(InputError, match="give positive ones"):
         buckling.tolerance({"A": -0.1})
+
+
+def test_deviations_of_a_load_by_those_of_a_field() -> None:
+    """Correlated over L: of ``g = 2 pi^2 sin^2 pi s`` the root of ``int int g(s) g(t) exp(-|s - t| / L)``."""
+    ends = (pinned(), pinned(lambda c: (None, 0.0, None), force=lambda c: (c.H, 0.0, -c.P)))
+    rod = replace(column(), ends=ends, span=(0.0, 15.0), planar="e1")
+    buckling = rodfem.trace(rod, depth=0).special("branch point")[0]
+    x, w = np.polynomial.legendre.leggauss(200)
+    s = (1 + x) / 2
+    g = np.pi**2 * np.sin(np.pi * s) ** 2 * w
+    for length in (0.1, 1.0, 100.0):
+        exact = 0.03 * np.sqrt(g @ np.exp(-abs(s[:, None] - s) / length) @ g)
+        assert buckling.tolerance({"A": (0.03, length)}).deviation == pytest.approx(exact, rel=5e-3)
+
+
+def test_deviation_by_a_family(tmp_path: Path) -> None:
+    """By the rods at the points of Gauss's rule for a normal A, within the second order of the deviation."""
+    pytest.importorskip("xarray")
+    scene, deviation = hemitropic_cases.scene(), 0.02
+    first = rodfem.trace(scene, depth=0).special("branch point")[0].tolerance({"C": deviation})
+    x, w = np.polynomial.hermite_e.hermegauss(5)
+    loads = rodfem.family(scene, {"C": 1.0 + deviation * x}, tmp_path, PLAN).first_loss.values
+    w = w / w.sum()
+    assert first.deviation == pytest.approx(np.sqrt(w @ (loads - w @ loads) ** 2), rel=deviation**2)
 
 
 def test_of_the_coefficient_of_a_pitchfork() -> None:
