@@ -1,10 +1,23 @@
 """Closed forms for the cord and for the rod under a follower load."""
 
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
+from scipy.special import ellipe, ellipk, jv
+
+TORQUE = 2 * brentq(lambda x: x * np.cos(x) - np.sin(x), 4.4, 4.6, xtol=1e-15, rtol=1e-14)
+"""Greenhill's torque between clamped ends; squared, the second critical load of a clamped column."""
+HEAVY = 9 / 4 * brentq(lambda x: jv(-1 / 3, x), 1.5, 2.2, xtol=1e-15, rtol=1e-14) ** 2
+"""Greenhill's weight of a column."""
+
+
+def elastica(P: float) -> tuple[float, float]:
+    """Tip of a bent cantilever of stiffness and length one, along and across: ``2 k / sqrt(P)``, ``K(k) = sqrt(P)``."""
+    w = sqrt(P)
+    m = brentq(lambda m: ellipk(m) - w, 0.0, 1 - 1e-15, xtol=1e-16, rtol=1e-14)
+    return 2 * float(ellipe(m)) / w - 1, 2 * sqrt(m) / w
 
 
 def waves(number: int = 6) -> list[float]:

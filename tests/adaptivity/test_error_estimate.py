@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from io import StringIO
-from math import hypot, pi, sqrt, tan
+from math import hypot, pi, tan
 from typing import Any
 
 import boundary_layer
@@ -13,33 +13,29 @@ import numpy as np
 import pytest
 import reference_values
 from classics import SUPPORTS, column
+from closed_forms import elastica
 from hard.two_freedoms import scene as two_freedoms
 from mpi4py import MPI
 from scipy.integrate import OdeSolution, solve_ivp
 from scipy.optimize import brentq
-from scipy.special import ellipk
 
 from rodfem import Branch, Diagram, Discretization, InputError, Ordinate, Plan, Scene, Solver, clamped, free, trace
 from rodfem.adaptivity import error_estimate
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.app.terminal import Report
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
+from rodfem.continuation.kinds import BRANCH_POINT, USER
 from rodfem.fem.newton import correct
 from rodfem.output.words import number
 
 LARGE = 3.0
 """A bar is not larger than this times the error, but for round-off."""
 ROUND_OFF = 1e-10
-DEEP = 8.973089969728
-"""Load at which the crown of a deep arch snaps, in units of EI/R^2, by shooting: 897 of DaDeppo & Schmidt (1975)."""
 
 
-def explored(scene: Scene, mesh: tuple[int, int] | float, at: tuple[float, ...] = (), depth: int = 0) -> list[Branch]:
-    """Explore a scene with error bars, on equal elements of a degree, or to an accuracy."""
-    accuracy = mesh if isinstance(mesh, float) else None
-    d = Discretization("auto", *mesh) if isinstance(mesh, tuple) else None
-    return trace(scene, d, Plan(at=at, depth=depth, steps=classics.WIDE, accuracy=accuracy)).branches
+def explored(scene: Scene, mesh: tuple[int, int], at: tuple[float, ...] = (), depth: int = 0) -> list[Branch]:
+    """Explore a scene with error bars, on equal elements of a degree."""
+    return trace(scene, Discretization("auto", *mesh), Plan(at=at, depth=depth, steps=classics.WIDE)).branches
 
 
 def branch_solver(diagram: Diagram) -> BranchSolver:
@@ -53,12 +49,6 @@ def check(value: float, exact: float, bar: float) -> None:
 
 
 # --- special points -------------------------------------------------------------------------------------------------
-
-
-@cache
-def tip(P: float) -> float:
-    """Deflection of a bent cantilever of stiffness and length one: ``2 k / sqrt(P)`` with ``K(k) = sqrt(P)``."""
-    return float(2 * sqrt(brentq(lambda m: ellipk(m) - sqrt(P), 0.0, 1 - 1e-12, xtol=1e-16) / P))
 
 
 @pytest.mark.ranks
@@ -76,7 +66,7 @@ def test_elastica(mesh: tuple[int, int]) -> None:
     for EI, s, branch in zip((1.0, 2.0), loads, buckled, strict=True):
         check(s.point.load, EI * pi**2 / 4, s.error_estimate)
         for end in (s for s in branch.special if s.kind != BRANCH_POINT):
-            check(end.point.ordinate, tip(end.point.load / EI), end.ordinate_error)
+            check(end.point.ordinate, elastica(end.point.load / EI)[1], end.ordinate_error)
 
 
 @cache
@@ -102,14 +92,6 @@ def test_deflection_inside_of_an_element(mesh: tuple[int, int], place: float) ->
     (branch,) = explored(rod, mesh, (3.0,))
     (found,) = (s for s in branch.special if s.kind == USER)
     assert abs(found.point.ordinate - bent(3.0)(place)[2]) <= found.ordinate_error
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7])
-def test_deep_arch_to_an_accuracy(accuracy: float) -> None:
-    (branch,) = explored(classics.deep_arch(), accuracy)
-    fold = next(s for s in branch.special if s.kind == FOLD)
-    assert abs(fold.point.load - DEEP) <= fold.error_estimate <= accuracy * DEEP
 
 
 # --- meshes that do not resolve the rod -----------------------------------------------------------------------------

@@ -7,22 +7,17 @@ import closed_form_hemitropic
 import closed_forms
 import numpy as np
 import pytest
+from closed_forms import HEAVY, TORQUE, elastica
 from numpy.polynomial import Legendre, Polynomial
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigvals, expm
 from scipy.optimize import brentq, fsolve, minimize_scalar
-from scipy.special import ellipk, jv
 
 from lesson.answers import answers
 
 
 def shot(slopes: Callable[[float, np.ndarray], list[float]], start: list[float]) -> np.ndarray:
     return np.asarray(solve_ivp(slopes, (0, 1), start, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1])
-
-
-def elastica() -> float:
-    m = brentq(lambda m: ellipk(m) ** 2 - 1.5 * pi**2 / 4, 0.1, 0.9, xtol=1e-15)
-    return 2 * m**0.5 / ellipk(m)
 
 
 def transverse() -> float:
@@ -36,20 +31,12 @@ def on_a_spring() -> float:
     return brentq(lambda w: w * np.tan(w) - 4, 0.1, 1.5, xtol=1e-14) ** 2
 
 
-def heavy() -> float:
-    return 9 / 4 * brentq(lambda x: jv(-1 / 3, x), 1.5, 2.2, xtol=1e-14) ** 2
-
-
-def tangent() -> float:
-    return brentq(lambda w: np.tan(w) - w, 4.4, 4.6, xtol=1e-14)
-
-
 def heavy_and_bent() -> float:
     """From the tip, at three small angles; the error of each is even in the angle (Richardson)."""
 
     def curvature(a: float) -> float:
         q = brentq(lambda q: shot(lambda t, y: [y[1], -q * t * np.sin(y[0])], [a, 0.0])[0], 7, 9, xtol=1e-13)
-        return (q / heavy() - 1) / a**2
+        return (q / HEAVY - 1) / a**2
 
     one, half, quarter = map(curvature, (0.2, 0.1, 0.05))
     return (64 * quarter - 20 * half + one) / 45
@@ -113,12 +100,12 @@ def tapered() -> float:
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("1", elastica),
+        ("1", lambda: elastica(1.5 * pi**2 / 4)[1]),
         ("1.2", transverse),
         ("1.3", on_a_spring),
-        ("2.2", heavy),
-        ("3", lambda: 4 * tangent() ** 2),
-        ("3.1", lambda: tangent() ** 2),
+        ("2.2", lambda: HEAVY),
+        ("3", lambda: TORQUE**2),
+        ("3.1", lambda: TORQUE**2 / 4),
         ("5.3", heavy_and_bent),
         ("6", greenhill),
         ("6.2", lambda: greenhill(10.0)),

@@ -1,20 +1,18 @@
 """Hard by their numbers: stiff against bending, meshes of any size and degree, rotations of many turns."""
 
-from math import inf, pi, sqrt, tan
+from math import inf, pi, sqrt
 
 import classics
 import numpy as np
 from classics import SUPPORTS, column
+from closed_forms import TORQUE
 from hard.case import Change, Measured, compare, run, said, singular
-from scipy.optimize import brentq
 from stability.test_soft_modes import nearly_free
 
 from rodfem import Discretization, Solver
 
 EULER = pi**2 / 4
 """Buckling load of a cantilever of length and bending stiffness one."""
-GREENHILL = 2 * brentq(lambda x: tan(x) - x, 4.4, 4.6, xtol=1e-15)
-"""Critical end moment between clamps."""
 
 
 def haringx(exponent: float, formulation: str = "reduced") -> Measured:
@@ -62,9 +60,9 @@ def graded(smallest: float) -> Measured:
 def turned(C: float) -> Measured:
     """Twisted between clamps until the moment C phi is Greenhill's: by 2 pi and more where C is small."""
     scene = classics.greenhill()
-    scene = scene.varying("phi", (0.0, 1.03 * GREENHILL / C), C=C)
+    scene = scene.varying("phi", (0.0, 1.03 * TORQUE / C), C=C)
     diagram = run(scene)
-    return compare(singular(diagram[0]), [Change(GREENHILL / C, 0, 2)], said(diagram))
+    return compare(singular(diagram[0]), [Change(TORQUE / C, 0, 2)], said(diagram))
 
 
 def soft(spring: float) -> Measured:

@@ -9,10 +9,11 @@ import closed_forms
 import numpy as np
 import pytest
 from classics import FORMULATIONS, column, explore, sweep
+from closed_forms import HEAVY, TORQUE, elastica
 from numpy.polynomial import Legendre, Polynomial
 from scipy.linalg import eigvals, expm
 from scipy.optimize import brentq, fsolve
-from scipy.special import ellipe, ellipk, jv
+from scipy.special import ellipe, ellipk
 from shooting_solver import Rod
 
 from rodfem import Discretization, End, Plan, Scene, Solver, clamped, free, trace
@@ -47,10 +48,6 @@ def test_euler(supports: str, formulation: str) -> None:
 PI2 = pi**2
 E1 = PI2 / 4
 """Euler's load of a cantilever."""
-TORQUE = 2 * root(lambda x: tan(x) - x, 4.4, 4.6)
-"""Greenhill's torque between clamped ends; squared, the second critical load of a clamped column."""
-HEAVY = 9 / 4 * root(lambda x: float(jv(-1 / 3, x)), 1.5, 2.2) ** 2
-"""Greenhill's weight of a column."""
 GA, EA = 50.0, 200.0
 
 
@@ -147,17 +144,10 @@ def test_critical_loads(name: str, formulation: str) -> None:
 # --- bent states ----------------------------------------------------------------------------------------------------
 
 
-def tip_of_elastica(P: float) -> tuple[float, float]:
-    """Tip of a bent cantilever of stiffness and length one, along and across."""
-    w = sqrt(P)
-    m = root(lambda m: float(ellipk(m)) - w, 0.0, 1 - 1e-15)
-    return 2 * float(ellipe(m)) / w - 1, 2 * sqrt(m) / w
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_elastica(formulation: str) -> None:
-    assert tip_of_elastica(1.5 * E1) == pytest.approx((0.3635882249, 0.7885758057), rel=1e-9)
+    assert elastica(1.5 * E1) == pytest.approx((0.3635882249, 0.7885758057), rel=1e-9)
     stops = (1.5 * E1, 8.0, 20.0)
     found = explore(classics.elastica(20.0), formulation, depth=1, stops=stops)
     assert len(found.branches) == 3
@@ -165,7 +155,7 @@ def test_elastica(formulation: str) -> None:
         for branch, EI in ((1, 1.0), (2, 2.0)):
             if EI * E1 < P:
                 r = found.sample(branch, P)["r"][-1]
-                miss = np.array([r[2], np.hypot(r[0], r[1])]) - tip_of_elastica(P / EI)
+                miss = np.array([r[2], np.hypot(r[0], r[1])]) - elastica(P / EI)
                 assert abs(miss).max() < 1e-9
     assert [b.points[-1].negative for b in found.branches] == [2, 0, 1]
 
@@ -295,7 +285,7 @@ def test_planar_column(formulation: str) -> None:
             assert (p.negative, p.negative_in_space) == (int(p.load > 2 * E1), (p.load > E1) + (p.load > 2 * E1))
     assert {(p.negative, p.negative_in_space) for p in found.branches[1].points[1:]} == {(0, 1)}
     r = found.sample(1)["r"][-1]
-    assert (r[2], abs(r[0])) == pytest.approx(tip_of_elastica(12.0 / 2), abs=1e-9)
+    assert (r[2], abs(r[0])) == pytest.approx(elastica(12.0 / 2), abs=1e-9)
     assert r[1] == 0
 
 

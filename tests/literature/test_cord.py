@@ -116,10 +116,3 @@ def test_first_branch_ends_on_planar_coils() -> None:
         assert (p.ordinate, p.energy) == pytest.approx((ordinate, energy), abs=1e-6)
     for s in above.special + below.special:
         assert abs(s.point.ordinate - coil(s.point.load)[0]) <= s.ordinate_error
-
-
-@pytest.mark.parametrize("name", ["branch 1", "branch 2", "branch 1.1"])
-def test_work_of_the_tension(name: str) -> None:
-    a, middle, b = (user_points(default()[name], load)[0] for load in AT)
-    integral = (b.load - a.load) / 6 * (a.ordinate + 4 * middle.ordinate + b.ordinate)  # dE = -lam dx
-    assert b.energy - a.energy + b.load * b.ordinate - a.load * a.ordinate == pytest.approx(integral, abs=1e-9)

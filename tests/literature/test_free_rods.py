@@ -97,23 +97,6 @@ def beal(load: float) -> np.ndarray:
 
 
 @pytest.mark.long
-def test_thrust_along_the_end() -> None:
-    """In the frame that moves with the rod the load is balanced by its inertia; Beal (AIAA J. 3, 1965): 109.69."""
-    low, high = 100.0, 120.0
-    while high - low > 1e-6:
-        middle = (low + high) / 2
-        flutters = (abs(beal(middle).imag) > 1.0).any()
-        low, high = (low, middle) if flutters else (middle, high)
-    ends = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
-    scene = floating(ends, (0.0, 130.0), distributed=lambda c: (0.0, 0.0, c.P))
-    diagram = rodfem.trace(scene, MESH, Plan(depth=0))
-    (found,) = diagram.special()
-    assert found.kind == "flutter" and (found.negative_before, found.negative_after) == (0, 4)
-    assert abs(found.point.load - low) < 1e-4 and found.error_estimate < 1e-6
-    assert found.point.load == pytest.approx(109.69, abs=5e-3)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("rotary", [0.0, 0.01])
 def test_thrust_of_a_rod_that_bends_unlike_in_its_planes(rotary: float) -> None:
     """Each plane by itself, the stiffer one as at half the load; a tilt of the rod is no state of its own.

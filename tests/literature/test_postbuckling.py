@@ -107,26 +107,6 @@ def test_size_of_a_displacement_at_a_transcritical_point() -> None:
     assert abs(found.law.coefficient - expected) <= found.law.uncertainty < 1e-4
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("C", [1.3, 1.4])
-def test_ring_whose_ordinate_is_its_length(C: float) -> None:
-    """Michell's ring buckles supercritically for C/B above 11/8, also where nothing is measured of it."""
-    found = michell(C, Ordinate("length", s=None, of=lambda x, c: x.v[2]))
-    assert found.law is not None and found.law.of == "distance"
-    assert found.law.kind == f"{'super' if C > 11 / 8 else 'sub'}critical pitchfork"
-    assert found.law.uncertainty < abs(found.law.coefficient)
-
-
-def michell(C: float, ordinate: Ordinate) -> Any:
-    """First branch point of Michell's ring, of intrinsic twist ``t``."""
-    ring = Scene(
-        "michell", (0.0, 2 * pi), RIGID, lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t), (1.0, 1.0, c.C)),
-        {"t": Parameter(1.0), "C": Parameter(C)}, "t", Ring(), ordinate, (1.0, 1.6), start=circle,
-    )  # fmt: skip
-    plan = Plan(depth=1, most_branches=2, error_bars=False)
-    return rodfem.trace(ring, Discretization(elements=14, degree=6), plan).special("branch point", "ring")[0]
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("C", [1.3, 1.4])
 def test_ring_of_intrinsic_twist(C: float) -> None:
@@ -134,7 +114,13 @@ def test_ring_of_intrinsic_twist(C: float) -> None:
 
     ``x`` is the twist in turns that it loses.  The coefficient is that of the expansion about the circle.
     """
-    found = michell(C, Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi)))
+    ring = Scene(
+        "michell", (0.0, 2 * pi), RIGID, lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t), (1.0, 1.0, c.C)),
+        {"t": Parameter(1.0), "C": Parameter(C)}, "t", Ring(),
+        Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi)), (1.0, 1.6), start=circle,
+    )  # fmt: skip
+    plan = Plan(depth=1, most_branches=2, error_bars=False)
+    found = rodfem.trace(ring, Discretization(elements=14, degree=6), plan).special("branch point", "ring")[0]
     assert abs(found.point.load - sqrt(3) / C) < 1e-9
     assert found.law is not None
     assert found.law.kind == f"{'super' if C > 11 / 8 else 'sub'}critical pitchfork"

@@ -55,14 +55,6 @@ def test_bending_in_the_plane() -> None:
         assert (p.energy, p.ordinate) == pytest.approx((end[10], 0), abs=1e-11)
 
 
-def test_work_of_the_force() -> None:
-    for branch in (default()["plane"], default()["branch 1"]):
-        a, middle, b = (user_points(branch, load)[0] for load in AT)
-        x = [tip(default(), p)[0] for p in (a, middle, b)]
-        integral = (b.load - a.load) / 6 * (x[0] + 4 * x[1] + x[2])  # dE = lam dr1(1)
-        assert b.energy - a.energy - b.load * x[2] + a.load * x[0] == pytest.approx(-integral, abs=1e-9)
-
-
 @pytest.mark.long
 def test_lateral_buckling() -> None:
     plane = default()["plane"]

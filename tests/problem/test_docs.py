@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_forms import flutter
-from literature.test_classics import CRITICAL, TORQUE, root
+from closed_forms import TORQUE, flutter
+from literature.test_classics import CRITICAL, root
 from problem.test_tables import buckling
 from rows import verify
 from scipy.linalg import expm

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.polynomial import Chebyshev, Polynomial
+from literature.test_free_rods import beal
+from numpy.polynomial import Polynomial
 
 from rodfem import Diagram
 
@@ -28,23 +29,10 @@ def test_every_number_of_the_page(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(diagrams) == 6 and not any(diagram.warnings for diagram in diagrams)
 
 
-def boom(load: float, size: int = 24) -> np.ndarray:
-    """Eigenvalues of a free beam under a thrust along its end, by collocation at Chebyshev points.
-
-    ``w'''' + P (s w')' = mu w`` with ``w'' = w''' = 0`` at both ends, of length, stiffness and mass one.
-    """
-    basis = [Chebyshev.basis(i, domain=(0.0, 1.0)) for i in range(size)]
-    s = (1 - np.cos(np.pi * (np.arange(size - 4) + 0.5) / (size - 4))) / 2
-    w, dw, d2w, d4w = (np.array([b.deriv(k)(s) if k else b(s) for b in basis]).T for k in (0, 1, 2, 4))
-    ends = np.array([[b.deriv(k)(s) for b in basis] for k in (2, 3) for s in (0.0, 1.0)])
-    fulfil = np.linalg.svd(ends)[2][4:].T  # combinations that satisfy the conditions at the ends
-    return np.linalg.eigvals(np.linalg.solve(w @ fulfil, (d4w + load * (dw + s[:, None] * d2w)) @ fulfil))
-
-
 def test_thrust_of_the_boom() -> None:
     """Where the square of an imaginary part, which is smooth, vanishes: the page's number, and Beal's (1965)."""
     beyond = np.linspace(109.7, 110.1, 10)
-    lowest = [mu[abs(mu) < 1e4] for mu in map(boom, beyond)]
+    lowest = [mu[abs(mu) < 1e4] for mu in map(beal, beyond)]
     roots = Polynomial.fit(beyond, [np.max(mu.imag) ** 2 for mu in lowest], 5).roots()
     thrust = roots[np.argmin(abs(roots - beyond[0]))].real
     assert thrust == pytest.approx(109.689191957, rel=2e-9) and thrust == pytest.approx(109.69, abs=5e-3)
