@@ -60,7 +60,7 @@ class Adjoint:
         Z, N = states.split(G)
         null = self.null = [combine(V, z) for z in Z.T]
         # rounding errors, independent, a hundred times, or all that is zero
-        self._noise = [100.0 * rounding(matrix, v, x) + 1e-15 * inertia.scale for v in null]
+        self._noise = [100.0 * rounding(matrix, v, x) + 1e-15 * inertia.scale for v in null]  # round-off
         if self.fold:
             return np.array([[column.dot(null[0])]])
         count = len(null)
