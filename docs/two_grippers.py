@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from scipy.io import loadmat
-from scipy.optimize import brentq
 
 import rodfem
 from rodfem import Plan
@@ -66,14 +65,11 @@ def compared(page: SimpleNamespace, data: dict[str, np.ndarray]) -> dict[str, fl
 
 
 def change_of_kind(page: SimpleNamespace, C22: float) -> float:
-    """Ratio C11 at which the coefficient vanishes, to the right of a path on which the rod leaves gently."""
-
-    def coefficient(C11: float) -> float:
-        value = first_loss(page, C11, C22)[1]
-        return float(np.sign(value) * np.log1p(abs(value)))
-
+    """Ratio C11 at which the coefficient vanishes: a mark of the locus of a path's branch point in kappa and C11."""
     gentle = 0.38 + 0.3 * C22
-    return float(brentq(coefficient, gentle, gentle + 0.35, xtol=1e-3))
+    diagram = rodfem.trace(page.grippers(gentle, C22), plan=Plan(depth=0, error_bars=False))
+    locus = diagram.locus(diagram.special("branch point")[0], "C11", (gentle - 0.2, gentle + 0.35), load=(5.0, 8.5))
+    return next(float(locus.values[mark.row, 1]) for mark in locus.marks if mark.kind.startswith("pitchfork"))
 
 
 def main(folder: Path) -> None:

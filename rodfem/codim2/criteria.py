@@ -84,7 +84,9 @@ class LocusPoint:
     ordinate: float = float("nan")
     rest: int = -1  # negative (without a potential: unstable) eigenvalues but for its own, -1: not counted
     omega2: float = float("nan")  # a double eigenvalue
-    curvature: float = 0.0  # of folds: second derivative of the equations along the null vector
+    curvature: float = (
+        0.0  # derivative of the energy along the null vector: the third of a fold, the fourth of a pitchfork
+    )
     coupling: np.ndarray = field(default_factory=lambda: np.zeros(2))  # that in the parameters, in units of the bounds
     modes: list[PETSc.Vec] = field(default_factory=list)  # null vectors and modes near by, or a cluster's basis
     left: list[PETSc.Vec] = field(default_factory=list)  # left null vectors, where they are others
@@ -262,7 +264,7 @@ class Singular(Criterion):
             ended=self.broken if curve.part > IMPERFECT else "",
             orientation=curve.side * int(np.copysign(1.0, size)),
             rest=unstable(self.frequencies.at(x), len(curve.left)) if self.frequencies else curve.negative,
-            curvature=curve.curvature if self.fold else 0.0,
+            curvature=curve.curvature,
             coupling=curve.work[:, 0] @ axes if self.fold else np.zeros(2),
             modes=curve.modes,
             multiplicity=len(found.vectors),

@@ -1,5 +1,8 @@
 """Points of codimension two between two nodes of a locus: cusps, and ends of folds and of flutter; and turning points.
 
+Where the fourth derivative of the energy along a pitchfork's branch vanishes that is super- on one side, and
+subcritical on the other: the coefficient of its law has another sign.
+
 At a *cusp* of a fold its curvature vanishes and both parameters turn back, while the coupling of its null vector with
 the parameters does not vanish.  If it does, in both of them at one place, the fold *ends on a branch point*: beyond it
 the curve is its own mirror image; or it *passes a branch point*, to other parameters.  A double eigenvalue that
@@ -48,6 +51,9 @@ no sign."""
 PARTS = 13  # of a step that shows a turning point or a cusp: an odd number, as its middle is likely to be one
 DOUBLE_ZERO = Sought(lambda n: n.omega2, stationary=False)
 """The end of a curve of flutter: its double eigenvalue vanishes."""
+QUARTIC = Sought(lambda n: n.curvature, stationary=False)
+"""Where a pitchfork is neither super- nor subcritical."""
+KIND = "pitchfork changes its kind"
 ENDS = "the fold ends on a branch point"
 DIVERGES = "the double eigenvalue vanishes: divergence"
 PASSES = "the fold passes a branch point"
@@ -191,6 +197,9 @@ class Codim2Points:
         cusp = self.located(p, q, lambda n: n.curvature)
         if cusp is None:
             return []
+        if not (p.coupling.any() or q.coupling.any()):  # of branch points: at a double one the derivative has a pole
+            vanishes = abs(cusp.curvature) < min(abs(p.curvature), abs(q.curvature))
+            return [(self._placed(cusp, QUARTIC), KIND)] if vanishes else []
         if _coupling_vanishes(cusp, a, b, 1e-3):  # the place of a cusp is known to no more
             # no solution locates it: corrections slide along the curve of branch points
             return [(_enclosure(cusp, p, q), PASSES)]

@@ -32,8 +32,9 @@ the derivatives by central differences, whose errors do not enter the converged 
 equation is that of a plane across the curve.  Without it the null vector ``(dlam, dt, xi)`` of the rows is the tangent,
 at a *cusp* of folds as well, where ``V.y = 0`` and neither parameter changes (Doedel, Keller & Kernevez, Int. J.
 Bifurcation Chaos 1 (1991) 493-520).  Where ``b = 0`` for both parameters a fold ends on a branch point.  Along a curve
-of branch points ``lam`` leads across it, and ``b_z`` changes by minus the rate of the eigenvalue, times ``xi``: because
-of the symmetry ``s`` and ``w`` have no part along the null vectors.
+of branch points ``lam`` leads across it, and ``b_z`` of ``lam`` vanishes: in its derivative in ``t``, along ``w`` of
+``t``, ``d/dt F_t(x + t w, lam + t)`` takes the place of that of ``F_lam``.  A parameter may turn or move the symmetry,
+as that of a helix: the tangent has a part along the null vectors then.
 
 *Divergence* under loads without a potential: S is not symmetric.  The border has ``M`` times the left null vectors as
 columns and ``M`` times the right ones as rows; the left ones ``W`` of the transposed equations take the place of ``V``
@@ -59,12 +60,18 @@ from rodfem.stability.inertia import Factored
 from rodfem.stability.reduced_stiffness import DIFFERENCE, Bordered, bordered_of
 from rodfem.tolerances import TINY
 
+PITCHFORK = 1e-6
+"""Derivative of an eigenvalue along its null vector, over the lowest bending one, of which a symmetry leaves less."""
+WIDE = 1e-2  # step of second differences, which lose more digits to round-off, in the metric
 FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown."""
 SPLIT = 1.1
 """Times what eigenvalues, or the ``D`` of pairs, that vanish as one differ by that each may be off: to first order."""
 SHARP = ((1.0, 4 / 3), (-1.0, -4 / 3), (2.0, -1 / 6), (-2.0, 1 / 6))
-"""Steps of a central difference of the fourth order, and their weights, twice the step over them."""
+"""Steps of a central difference of the fourth order, and their weights, twice the step over them.
+
+Over the steps once more these are the weights of a second difference, of what vanishes in the middle.
+"""
 Vectors = Sequence[PETSc.Vec]
 
 
@@ -93,7 +100,7 @@ class Curve:
     rates: np.ndarray  # (2,), derivatives of the mean of the eigenvalues that vanish
     work: np.ndarray  # (2, k), derivatives of the equations along the left null vectors
     part: float  # of the sum of its terms that the work of the tangent is; zero of round-off, and of a fold
-    curvature: float  # derivative of the eigenvalue along the first null vector
+    curvature: float  # derivative of the eigenvalue along a fold, the second one along the branch of a pitchfork
     modes: list[PETSc.Vec]  # of the border, the null vectors first
     left: list[PETSc.Vec]  # left null vectors
     negative: int  # other eigenvalues below zero; -1 where S is not symmetric
@@ -121,7 +128,10 @@ class SingularState:
 
 @dataclass(frozen=True)
 class _Linear:
-    """The equations linearised at a state; ``y`` and ``f`` (parameters,) are sums over the null vectors."""
+    """The equations linearised at a state; ``y`` and ``f`` (parameters,) are sums over the null vectors.
+
+    At a branch point ``r`` and ``q`` (k, parameters) are of each of them.
+    """
 
     vectors: list[PETSc.Vec]  # s, a w for each parameter, V
     border: np.ndarray  # (m, 1 + parameters + m): c, b, G
@@ -131,6 +141,8 @@ class _Linear:
     left: list[PETSc.Vec]
     y: PETSc.Vec
     f: np.ndarray
+    r: list[PETSc.Vec]
+    q: np.ndarray
     rows: np.ndarray  # (m + 1, 1 + parameters + m): their products with (1, share) are to vanish
 
     @property
@@ -264,8 +276,9 @@ class SingularSystem:
             Z, N = self.split(border[:, -len(V) :])
             null, left = ([combine(side, z) for z in Z.T] for side in (V, sides[-1]))
             y, f = self._along_null(x, t, (null, left), sharp=sharp)
-            at = _Linear([s, *responses, *V], border, columns, Z, N, left, y, f, border)
-        return replace(at, rows=self._equations(x, at))
+            r, q = self._along_load(x, t, responses[0], [] if self.fold else left)
+            at = _Linear([s, *responses, *V], border, columns, Z, N, left, y, f, r, q, border)
+        return replace(at, rows=self._equations(at))
 
     def split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The modes that are to vanish, and the others: eigenvectors of G, by what they have of the last ones."""
@@ -276,13 +289,13 @@ class SingularSystem:
         order = np.argsort(-np.linalg.norm(self.Z.T @ vectors, axis=0))
         return vectors[:, order[:k]], vectors[:, order[k:]]
 
-    def _equations(self, x: PETSc.Vec, at: _Linear) -> np.ndarray:
+    def _equations(self, at: _Linear) -> np.ndarray:
         """The rows of the equations."""
         forces = (np.hstack([at.N, at.Z]).T if self.fold else at.N.T) @ at.border
         trace = np.array([v.dot(at.y) for v in at.vectors])
         trace[1 : 1 + len(at.f)] += at.f
         trace[0] -= np.trace(at.Z.T @ at.G @ at.Z)
-        return np.vstack([forces, *([] if self.fold else [self._work(x, at, trace)]), trace])
+        return np.vstack([forces, *([] if self.fold else [self._work(at)]), trace])
 
     def _along_null(
         self, x: PETSc.Vec, t: float, sides: tuple[Vectors, Vectors], *, sharp: bool
@@ -303,24 +316,26 @@ class SingularSystem:
                 y.axpy(share, self.image(found.matrix, left))
         return y, f
 
-    def _work(self, x: PETSc.Vec, at: _Linear, trace: np.ndarray) -> np.ndarray:
+    def _along_load(self, x: PETSc.Vec, t: float, w: PETSc.Vec, left: Vectors) -> tuple[list[PETSc.Vec], np.ndarray]:
+        """``r`` of each of the ``left`` null vectors, and ``q``, by central differences along the response ``w``."""
+        h, r = DIFFERENCE / self.system.norm(w), [self.system.new_vector() for _ in left]
+        q = np.zeros((len(left), 1 if self._section is None else 2))
+        for share in (0.5 / h, -0.5 / h) if left else ():
+            there = x + w * float(np.copysign(h, share))
+            if self._section is not None:
+                second = self._second(there, t)
+                q[:, 1] += [share * v.dot(second) for v in left]
+            found = self._matrix(there, t, moved=True)
+            q[:, 0] += [share * v.dot(found.border) for v in left]
+            for image, v in zip(r, left, strict=True):
+                image.axpy(share, self.image(found.matrix, v))
+        return r, q
+
+    def _work(self, at: _Linear) -> np.ndarray:
         """Rows (k, 1 + parameters + m) of ``Z^t b = 0``."""
-        constant = -at.Z.T @ at.b[:, 0]
-        if self._section is not None:
-            return np.column_stack([constant, np.zeros((self.count, 2)), trace[1] / self.count * at.Z.T])
-        w = at.vectors[1]
-        h, r, bend = DIFFERENCE / self.system.norm(w), [self.system.new_vector() for _ in at.left], w.duplicate()
-        bend.set(0.0)
-        for sign in (1.0, -1.0):
-            found = self.inertia.moved(x + w * (sign * h))
-            for image, left in zip(r, at.left, strict=True):
-                image.axpy(sign / (2 * h), self.image(found.matrix, left))
-            bend.axpy(sign / (2 * h), found.matrix * w)
-            bend.axpy(sign / (2 * h), found.border)
-        self.system.set_load(bend, 0.0)
-        rows = np.array([[v.dot(image) for v in at.vectors] for image in r])
-        rows[:, 1] = [bend.dot(left) for left in at.left]
-        rows[:, 0] += constant
+        rows = np.array([[v.dot(image) for v in at.vectors] for image in at.r])
+        rows[:, 1 : 1 + at.q.shape[1]] += at.q
+        rows[:, 0] -= at.Z.T @ at.b[:, 0]
         return rows
 
     def image(self, matrix: PETSc.Mat, left: PETSc.Vec) -> PETSc.Vec:
@@ -371,7 +386,8 @@ class SingularSystem:
         # rounding errors of phi . F, independent and as large as those of phi . S x, a hundred times
         noise = 100.0 * max(rounding(matrix, v, x) for v in null) + 1e-15 * self.inertia.scale  # or all vanish
         if self._section is not None:
-            curve = self._curve(share[:2], at, noise)
+            quartic = self._quartic(x, t, at, null[0])
+            curve = self._curve(share[:2], at, noise, quartic)
         others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z
         response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self.rest(at.N, at.G, -at.b[:, 0]))]))
         vectors = [v.copy() for v in null]
@@ -395,7 +411,7 @@ class SingularSystem:
             curve,
         )
 
-    def _curve(self, last: np.ndarray, at: _Linear, noise: float) -> Curve:
+    def _curve(self, last: np.ndarray, at: _Linear, noise: float, quartic: float) -> Curve:
         """The curve through a solution."""
         (m, k), own = at.Z.shape, self._own(at)[1:, 1:]
         table = at.rows[m - k :, 1:] @ own
@@ -411,11 +427,27 @@ class SingularSystem:
             table[-1, :2] / k,
             -at.b.T @ at.Z,
             0.0 if self.fold else self._part(at, slope[:2] / np.linalg.norm(slope[:2]), noise),
-            float(table[-1, 2]),
+            float(table[-1, 2]) if self.fold else quartic,
             [combine(at.V, z) for z in np.hstack([at.Z, at.N]).T],
             at.left,
             self._negative(at.N) if self.psi is self.phi else -1,
         )
+
+    def _quartic(self, x: PETSc.Vec, t: float, at: _Linear, null: PETSc.Vec) -> float:
+        """Fourth derivative of the energy along a pitchfork's branch, at the state ``x``, ``t`` that is factored.
+
+        The branch bends by ``z`` with ``S z = -y``: it is ``V . F_xxx V V V + 3 z . y``; zero of what is no pitchfork.
+        """
+        simple = self.count == 1 and not self.fold and self.psi is self.phi
+        if not simple or abs(null.dot(at.y)) > PITCHFORK * self.inertia.scale:
+            return 0.0
+        (z, *V), border = self._bordered[0].solve([-at.y])
+        z, bend = combine([z, *V], np.array([1.0, *(at.N @ self.rest(at.N, at.G, -border[:, 0]))])), 0.0
+        for step, weight in SHARP:
+            matrix = self._matrix(x + null * (step * WIDE), t, moved=True).matrix
+            bend += weight / (step * WIDE**2) * self.image(matrix, null).dot(null)
+        self._matrix(x, t)
+        return bend + 3 * z.dot(at.y)
 
     def rest(self, N: np.ndarray, G: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Amplitudes (m - k, ...) of modes near by under ``forces`` (m, ...); zero where nothing holds a mode."""

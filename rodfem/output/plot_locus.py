@@ -28,6 +28,7 @@ POINTS: dict[str, dict[str, Any]] = {
     "start": {**USER.marker, "label": "start"},
     "turns": {**OPEN, "marker": "|", "ms": 9.0, "label": "turning point"},
     "cusp": {**OPEN, "marker": "^", "ms": 7.5, "label": "cusp"},
+    "pitchfork": {**OPEN, "marker": "s", "ms": 6.0, "label": "pitchfork changes its kind"},
     "ends": {**OPEN, "marker": "o", "ms": 6.5, "label": "fold meets branch point"},
 }
 """Markers of rows by the first word of what happens there."""

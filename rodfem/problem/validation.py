@@ -64,11 +64,17 @@ def check_load(scene: Scene) -> None:
         raise SceneError(f"Nothing in the scene depends on its load {scene.load!r}: {use}.")
 
 
+def _places(scene: Scene) -> list[tuple[str, float]]:
+    """Places where elements meet, each with what is there."""
+    found = [("break", s) for s in scene.breaks] + [("attachment", x.s) for x in scene.attachments]
+    for x in scene.constraints:
+        found += [("end of a tendon" if x.s is None else "constraint", s) for s in x.places]
+    return found
+
+
 def check_places(scene: Scene) -> None:
     """Raise :class:`SceneError` for a place that is not on the rod, or next to another one or an end, but not there."""
-    a, b = scene.interval
-    places = [("break", s) for s in scene.breaks] + [("attachment", x.s) for x in scene.attachments]
-    places += [("constraint" if x.s is not None else "end of a tendon", s) for x in scene.constraints for s in x.places]
+    (a, b), places = scene.interval, _places(scene)
     for what, s in [*places, *(("ordinate", s) for s in scene.ordinate.places)]:
         if not a <= s <= b:
             raise SceneError(f"The {what} at s = {s:g} is not on the rod: choose {a:g} <= s <= {b:g}.")
