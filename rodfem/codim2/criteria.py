@@ -32,7 +32,7 @@ from rodfem.fem.state import Line, line
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.units import size
-from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, as_vectors, measure, noise_of
+from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 from rodfem.tolerances import NEGLIGIBLE, ROUND_OFF, TINY
 
@@ -332,7 +332,7 @@ class Collision(Criterion):
             ordinate=self.solver.shape.ordinate(x),
             omega2=omega2,
             orientation=orientation,
-            modes=as_vectors(system, basis),
+            modes=system.vectors(basis),
             rest=rest + (here.cluster.size if omega2 < 0 else 0),
         )
 

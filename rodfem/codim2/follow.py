@@ -43,7 +43,6 @@ from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, DIVERGENCE, FLUTTER
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.checks import Convexity, QuadratureCheck
 from rodfem.fem.shape import halved
-from rodfem.stability.cluster import as_vectors
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 from rodfem.tolerances import INSIDE, same_special
 
@@ -296,7 +295,7 @@ class Curve:
         modes, multiplicity = [*special.null_vectors, *special.nearby], special.multiplicity
         if special.kind == FLUTTER:
             assert special.cluster is not None
-            modes, multiplicity = as_vectors(solver.system, special.cluster.basis), 0
+            modes, multiplicity = solver.system.vectors(special.cluster.basis), 0
         if special.kind == DIVERGENCE:
             multiplicity = abs(special.negative_after - special.negative_before)
             modes, left = null_vectors(solver, x, multiplicity)

@@ -140,7 +140,7 @@ def across_orbit(system: System, last: PETSc.Vec, x: PETSc.Vec, direction: PETSc
     system.set_phase(last)
     phase, generators = system.phase, system.at(last).generators
     for i, weights in phase.broken.items():
-        motion, condition = system.generators.vector(weights @ generators), phase.conditions[i]
+        motion, condition = system.new_vector(weights @ generators), phase.conditions[i]
         assert condition is not None
         x.axpy(phase.offsets[i] - condition.dot(x), motion)
         direction.axpy(-condition.dot(direction), motion)

@@ -127,7 +127,7 @@ def of_miss(piece: Piece, node: Node) -> Candidate:
 def _modes(piece: Piece, W: np.ndarray, vectors: np.ndarray) -> list[PETSc.Vec]:
     """Modes ``W v`` of vectors of H, orthonormal in the metric."""
     inertia = piece.solver.inertia
-    modes = [inertia.vector(W @ v) for v in vectors.T]
+    modes = inertia.system.vectors(W @ vectors)
     orthonormalize(modes, inertia.metric)
     return modes
 

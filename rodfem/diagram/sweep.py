@@ -30,7 +30,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.errors import ConvergenceError, SceneError, many
 from rodfem.fem.shape import halved
 from rodfem.ranks import as_failure, guard
-from rodfem.stability.cluster import Cluster, as_vectors
+from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.inertia import Index
 from rodfem.stability.nonsymmetric import FREQUENCIES, REAL, Frequencies, NonsymmetricSolver, begins_slowly, label
@@ -183,8 +183,7 @@ class Sweep:
         if found.floating:
             return
         for i in np.flatnonzero(abs(found.values) < found.noise).tolist():
-            mode = system.new_vector()
-            mode.array[:] = found.vectors[:, i].real
+            mode = system.new_vector(found.vectors[:, i].real)
             if system.drift(mode) <= DRIFT * system.stiffness_scale * system.norm(mode):
                 moving.append(pencil.motion(found.vectors[:, [i]].real))
         if number := min(len(moving), self._zeros):
@@ -326,7 +325,7 @@ class SweepErrors(Enriched):
         x = moved = at_load(self.solver, guess, point.load)
         of_ordinate = of_load = self.of_ordinate(point.x, x, round_off(point.ordinate, self.units.ordinate), rho)
         if s.cluster is not None:
-            vectors = as_vectors(self.coarse.system, s.cluster.basis)
+            vectors = self.coarse.system.vectors(s.cluster.basis)
             columns = [self.transfer(v, state=False).array_r.real for v in vectors]
             cluster = Cluster(np.stack(columns, axis=1), s.cluster.mean)
             measured = Measuring(self.solver, self.eigensolver, guess)

@@ -238,4 +238,4 @@ class State(NodalValues):
 
     def generator(self, symmetry: int) -> PETSc.Vec:
         """Change under the infinitesimal symmetry, in all fields and scalars that it moves."""
-        return self.system.generators.vector(self.generators[symmetry])
+        return self.system.new_vector(self.generators[symmetry])

@@ -253,17 +253,11 @@ class Generators:
         return at(state.load) if self._varies else self._fixed
 
     def at(self, state: State) -> np.ndarray:
-        """All generators at a state, (count, own rows): see :meth:`vector`."""
+        """All generators at a state, (count, own rows)."""
         if not self.motions:
             return np.zeros((0, len(self._rows)))
         linear = times(self._linear, state.local[self._columns])
         return linear.reshape(len(self.motions), -1) + self._constant(state)
-
-    def vector(self, own: np.ndarray) -> PETSc.Vec:
-        """Vector of the system with these own rows, without component along drifts."""
-        out = self.system.new_vector()
-        out.array[: len(own)] = own
-        return out
 
 
 @dataclass(frozen=True)
@@ -305,7 +299,7 @@ class Phase:
 def no_phase(system: System) -> Phase:
     """No active condition for any drift scalar of the ``system``."""
     count = len(system.drifts)
-    return Phase({}, {}, np.zeros(count), {}, np.eye(count), None, system.generators.vector)
+    return Phase({}, {}, np.zeros(count), {}, np.eye(count), None, system.new_vector)
 
 
 def phase_at(system: System, reference: PETSc.Vec) -> Phase:
@@ -317,7 +311,7 @@ def phase_at(system: System, reference: PETSc.Vec) -> Phase:
     numbers = [i for i, (size, bound) in enumerate(zip(sizes, least, strict=True)) if size >= bound]
     kept = combinations[[i for i in range(len(sizes)) if i not in numbers]]
     if not numbers:  # a straight rod has all of them itself
-        return Phase({}, {}, np.zeros(count), {}, kept, reference.copy(), system.generators.vector)
+        return Phase({}, {}, np.zeros(count), {}, kept, reference.copy(), system.new_vector)
     weights = combinations[numbers] / np.array([sizes[i] for i in numbers])[:, None]
     rows, offsets, own = weights @ images, np.zeros(count), system.fields.free_owned
     offsets[numbers] = rows[:, : len(own)] @ state.local[own]
@@ -325,7 +319,7 @@ def phase_at(system: System, reference: PETSc.Vec) -> Phase:
     if system.rigid is not None:
         forces = dict(zip(numbers, rows + _generic_forces(system, system.rigid, state, numbers), strict=True))
     broken = dict(zip(numbers, weights, strict=True))
-    return Phase(conditions, forces, system.sum(offsets), broken, kept, reference.copy(), system.generators.vector)
+    return Phase(conditions, forces, system.sum(offsets), broken, kept, reference.copy(), system.new_vector)
 
 
 def _generic_forces(system: System, rigid: Generators, state: State, numbers: list[int]) -> np.ndarray:
@@ -355,7 +349,7 @@ def _orthogonal(system: System, state: State, gram: np.ndarray) -> tuple[np.ndar
                 rest = rest - weights / size**2 * (weights @ gram[:, -1])
         rest = rest / np.linalg.norm(rest)
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
-        sizes.append(system.norm(system.generators.vector(rest @ state.generators)))
+        sizes.append(system.norm(system.new_vector(rest @ state.generators)))
         combinations = np.vstack([combinations, rest])
         least.append(max(10.0 * _jumps(state), 1e-5))  # as SYMMETRIC_STATE, of what is left over
     return combinations, sizes, least

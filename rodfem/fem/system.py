@@ -130,11 +130,17 @@ class System:
 
     # --- vectors -----------------------------------------------------------------------------------------------
 
-    def new_vector(self) -> PETSc.Vec:
-        """Zero vector of all unknowns."""
+    def new_vector(self, own: np.ndarray | Sequence[float] = ()) -> PETSc.Vec:
+        """Vector of all unknowns whose first rows on this rank are ``own``, and all others zero."""
         vector = self.workspace.duplicate()
         vector.set(0.0)
+        if len(own):
+            vector.array[: len(own)] = own
         return vector
+
+    def vectors(self, columns: np.ndarray) -> list[PETSc.Vec]:
+        """Vectors whose rows on this rank are ``columns`` (own rows, k)."""
+        return [self.new_vector(column) for column in columns.T]
 
     def scalar(self, x: PETSc.Vec, name: str = LOAD) -> float:
         """Value of a scalar unknown, the same on all ranks."""
@@ -161,7 +167,7 @@ class System:
         """Metric times vectors of which this rank has these rows each, (count, own rows)."""
         if self._weights is not None:
             return np.array([times(self._weights, row) for row in own]).reshape(own.shape)
-        images = [self.metric * self.generators.vector(row) for row in own]
+        images = [self.metric * self.new_vector(row) for row in own]
         return np.array([image.array_r[: own.shape[1]].real for image in images]).reshape(own.shape)
 
     def norm(self, d: PETSc.Vec) -> float:
@@ -198,11 +204,7 @@ class System:
 
     def changes(self, columns: np.ndarray) -> np.ndarray:
         """Local values of changes of state whose own rows are ``columns`` (own rows, k): (k, local size)."""
-        out, vector = np.zeros((columns.shape[1], len(self.fields.number))), self.new_vector()
-        for local, column in zip(out, columns.T, strict=True):
-            vector.array[:] = column
-            local[:] = self.change(vector).local
-        return out
+        return np.array([self.change(vector).local for vector in self.vectors(columns)])
 
     def gathered(self, x: PETSc.Vec) -> np.ndarray:
         """Values of a vector at this rank's free local degrees of freedom, in ascending order, then the drifts'."""
@@ -213,12 +215,9 @@ class System:
 
     def vector(self, local: np.ndarray, drifts: Sequence[float] | np.ndarray = ()) -> PETSc.Vec:
         """Vector of local values (see :meth:`Fields.filled`), of which those of clamps are left out, and of drifts."""
-        x, f = self.new_vector(), self.fields
-        own = [local[f.free_owned], local[f.copies[0]], drifts] if self.has_scalars else [local[f.free_owned]]
-        values = np.concatenate(own)
-        x.array[: len(values)] = values
-        x.assemble()
-        return x
+        f = self.fields
+        scalars = [local[f.copies[0]], drifts] if self.has_scalars else []
+        return self.new_vector(np.concatenate([local[f.free_owned], *scalars]))
 
     # --- assembly ----------------------------------------------------------------------------------------------
 
@@ -328,7 +327,7 @@ class System:
         moved = x.copy()
         moved.axpy(1.0, direction)
         changes = self.generators.at(self.at(moved)) - self.generators.at(self.at(x))
-        return [self.generators.vector(weights @ changes) for weights in self.phase.kept]
+        return [self.new_vector(weights @ changes) for weights in self.phase.kept]
 
     def active_drifts(self, x: PETSc.Vec) -> int:
         """Number of symmetries that the state ``x`` breaks: as many of its zero eigenvalues belong to them."""

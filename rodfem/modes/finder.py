@@ -37,7 +37,7 @@ from rodfem.problem.quaternions import CONJUGATE, directors, product
 from rodfem.ranks import as_failure
 from rodfem.stability import motion_names
 from rodfem.stability.assessment import Assessor, Verdict
-from rodfem.stability.cluster import DRAWN, as_vectors
+from rodfem.stability.cluster import DRAWN
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.near_zero import soft_limit
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricPencil
@@ -284,7 +284,7 @@ class ModeFinder:
     def _complex(self, x: PETSc.Vec, values: np.ndarray, *, dual: bool = False) -> Motion:
         """Motion of a complex perturbation, or weights of a complex functional, by its values on this rank (n,)."""
         evaluate = self.motions.dual if dual else self.motions.at
-        parts = as_vectors(self.system, np.stack([values.real, values.imag], axis=1))
+        parts = self.system.vectors(np.stack([values.real, values.imag], axis=1))
         return _sum([evaluate(x, part) for part in parts], np.array([1.0, 1j]))
 
 

@@ -11,8 +11,8 @@ of Elasticity*, 3rd ed. (1970), chapter 10.  Shear factors are those of G. R. Co
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import exp, inf, pi
+from dataclasses import dataclass, replace
+from math import exp, inf, pi, sqrt
 from typing import Any
 
 from rodfem.errors import InputError
@@ -20,6 +20,34 @@ from rodfem.forms.energy import bending_and_twist, shear_and_stretch
 from rodfem.forms.kinematics import RODS
 from rodfem.problem.arguments import Check, checked, finite, reals
 from rodfem.problem.scene import Inertia
+
+NO_DENSITY = "The section has no density: give one, as in density=7850.0."
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Units in which a rod has the length, the bending stiffness about ``d1`` and the mass per length one.
+
+    A number without dimension times its unit is the number itself: a load ``P`` is ``P * scales.force``.  The unit of
+    ``force`` is ``E I1 / length^2``, that of ``time`` ``length^2 sqrt(mass / E I1)``, zero for a section without a
+    density.
+    """
+
+    length: float
+    force: float
+    time: float
+
+    @property
+    def moment(self) -> float:
+        """Unit of moments and of energy, ``E I1 / length``."""
+        return self.force * self.length
+
+    @property
+    def frequency(self) -> float:
+        """Unit of circular frequencies; raises :class:`InputError` without a density."""
+        if not self.time:
+            raise InputError(NO_DENSITY)
+        return 1 / self.time
 
 
 @dataclass(frozen=True)
@@ -94,10 +122,22 @@ class Section:
 
         return stored
 
+    def scales(self, length: float) -> Scales:
+        """Units of a rod of this section and a ``length``; raises :class:`InputError` for what is no length."""
+        L = LENGTH("length", length)
+        return Scales(L, self.bending[0] / L**2, L**2 * sqrt(self.mass / self.bending[0]))
+
+    def scaled(self, scales: Scales) -> Section:
+        """The same section in other units; in its own ``scales`` its ``E I1`` is one."""
+        L = scales.length
+        density = self.density * L**4 / (scales.force * scales.time**2) if scales.time else 0.0
+        second = {name: getattr(self, name) / L**4 for name in ("I1", "I2", "J")}
+        return replace(self, area=self.area / L**2, E=self.E * L**2 / scales.force, density=density, **second)
+
     def inertia(self) -> Inertia:
         """Mass and rotary inertia for a scene; raises :class:`InputError` without a density."""
         if not self.density:
-            raise InputError("The section has no density: give one, as in density=7850.0.")
+            raise InputError(NO_DENSITY)
         return Inertia(rho_A=lambda c: self.mass, rho_I=lambda c: self.rotary_inertia)
 
 

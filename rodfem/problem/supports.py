@@ -8,7 +8,6 @@ in the directions in which the position moves without stiffness: along a stiff o
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,35 +31,26 @@ FLAT = 1e-3
 
 
 def supports_of(scene: Scene, sample: Sample, first: dict[str, Support] | None = None) -> dict[str, Support]:
-    """Supports of a rod by the names of their places, in a state given by :meth:`~rodfem.fem.shape.Shape.sample`."""
-    places: list[tuple[str, float, End, Callable[[Constants], Any] | None]] = [
-        (f"{side} end", s, end, None)
-        for side, s, end in zip(SIDES, scene.interval, scene.sides, strict=True)
-        if not end.closed
-    ]
+    """Supports of a rod by the names of their places, in a state given by :meth:`~rodfem.fem.shape.Shape.sample`.
+
+    Those of the ``first`` state say what is a spring.
+    """
+    sides = zip(SIDES, scene.interval, scene.sides, strict=True)
+    places: dict[str, tuple[float, End, Any]] = {f"{side} end": (s, e, None) for side, s, e in sides if not e.closed}
     for i, x in enumerate(scene.attachments, start=1):
-        places.append((f"attachment {i}", x.s, End(force=x.force, follower=x.follower, energy=x.energy), x.mass))
-    out = {}
-    for name, s, end, mass in places:
-        springs = None
-        if first is not None:
-            springs = np.array([first[name].translation_stiffness, first[name].rotation_stiffness])
-        out[name] = _support(scene, s, end, sample, springs)
-        if mass is not None:
-            out[name] = replace(out[name], mass=number_of(mass(scene.constants(float(sample["load"]), s))))
-    return out
+        places[f"attachment {i}"] = x.s, End(force=x.force, follower=x.follower, energy=x.energy), x.mass
+    known: dict[str, Support | None] = {**(first or dict.fromkeys(places))}
+    return {name: _support(scene, sample, *place, known[name]) for name, place in places.items()}
 
 
-def _support(scene: Scene, s: float, end: End, sample: Sample, springs: Floats | None) -> Support:
+def _support(scene: Scene, sample: Sample, s: float, end: End, mass: Any, first: Support | None) -> Support:
     start = np.array(IDENTITY) if scene.start is None else np.asarray(scene.start(np.array([s])), dtype=float)[0]
     frame, loads, c = start / np.linalg.norm(start), np.zeros((2, 3)), scene.constants(float(sample["load"]), s)
-    if springs is None:
-        springs = np.zeros((2, 3, 3))
-        if end.energy is not None:
-            there = _point(scene, s, _state(sample, s)[0], frame)
-            springs = _springs(derivative_of(end.energy, c, there, 2))
+    springs = np.array([first.translation_stiffness, first.rotation_stiffness]) if first else np.zeros((2, 3, 3))
     if end.energy is not None:
-        loads = _load_of(end.energy, c, _point(scene, s, *_state(sample, s)), springs)
+        r, q = _state(sample, s)
+        springs = springs if first else _springs(derivative_of(end.energy, c, _point(scene, s, r, frame), 2))
+        loads = _load_of(end.energy, c, _point(scene, s, r, q), springs)
         loads[1] *= end.turning != HELD
     if end.rotation is not None:
         frame = np.array([number_of(x) for x in end.frame(c)])
@@ -74,7 +64,7 @@ def _support(scene: Scene, s: float, end: End, sample: Sample, springs: Floats |
         axis=np.zeros(3) if end.hinge is None else np.asarray(end.hinge, dtype=float),
         translation_stiffness=springs[0],
         rotation_stiffness=springs[1],
-        mass=0.0,
+        mass=number_of(mass(c)) if mass else 0.0,
         frame=frame / np.linalg.norm(frame),
         force=np.where(held, 0.0, _vector(end.force, c) + loads[0]),
         moment=_vector(end.moment, c) + loads[1],

@@ -294,11 +294,8 @@ class Dense(Method):
                 "more elements."
             )
         nu, w = nu[::-1][:number], w[:, ::-1][:, :number]
-        vectors, own = [], slice(*below.matrix.getOwnershipRange())
-        for column in (pencil.images @ w / nu).T:
-            vectors.append(self.work.system.new_vector())
-            vectors[-1].array[:] = column[own]
-        values = below.shift + 1.0 / nu
+        own, values = slice(*below.matrix.getOwnershipRange()), below.shift + 1.0 / nu
+        vectors = self.work.system.vectors((pencil.images @ w / nu)[own])
         errors = below.backward_errors(values, vectors)
         return Eigenvalues(self.work.one * values, below.unscaled(vectors), errors, below.certifies(values))
 

@@ -31,10 +31,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
-from rodfem.fem.system import System
 from rodfem.linalg.matrices import EPS, local_rows
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.nonsymmetric import REAL, STILL, Frequencies, NonsymmetricPencil, squares
@@ -128,14 +126,6 @@ def closed(values: np.ndarray, share: np.ndarray, size: int) -> list[int]:
         if (len(chosen), share[chosen].sum()) > (len(best), share[best].sum()):
             best = chosen
     return sorted(best)
-
-
-def as_vectors(system: System, columns: np.ndarray) -> list[PETSc.Vec]:
-    """Columns (n, k) of this rank's values as vectors of a system."""
-    out = [system.new_vector() for _ in columns.T]
-    for vector, column in zip(out, columns.T, strict=True):
-        vector.array[:] = column
-    return out
 
 
 def real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:

@@ -229,12 +229,6 @@ class Inertia:
         """Norms (k,) of vectors (own rows, k) in the metric."""
         return np.sqrt(np.maximum(self.sum((own * self.weighed(own)).sum(axis=0)), 0.0))
 
-    def vector(self, own: np.ndarray) -> PETSc.Vec:
-        """Vector of own rows."""
-        out = self.system.new_vector()
-        out.array[:] = own
-        return out
-
     def sum(self, own: np.ndarray) -> np.ndarray:
         """Sum over the ranks."""
         return own if self.system.comm.size == 1 else np.asarray(self.system.comm.allreduce(own, op=MPI.SUM))
@@ -334,7 +328,7 @@ class Factored:
             images = own.times(vectors)
             theta, z = np.linalg.eigh(own.sum(vectors.T @ images))
             order = np.argsort(abs(theta + own.shift))
-            found = [own.vector(v) for v in (vectors @ z[:, order]).T]
+            found = own.system.vectors(vectors @ z[:, order])
         own.vectors = found
         return (theta[order] + own.shift)[:number], [v.copy() for v in found[:number]]
 

@@ -101,7 +101,7 @@ def symmetry_modes(system: System, x: PETSc.Vec) -> dict[int, PETSc.Vec]:
         return {}
     generators = system.at(x).generators
     broken = system.phase.broken.items()
-    return {system.drifts[i]: system.generators.vector(weights @ generators) for i, weights in broken}
+    return {system.drifts[i]: system.new_vector(weights @ generators) for i, weights in broken}
 
 
 def weighed_modes(

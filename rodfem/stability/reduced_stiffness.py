@@ -115,10 +115,7 @@ class Bordered:
             out = self.factors.solve_all(right)
             whole = out if self.comm.size == 1 else np.concatenate(self.comm.allgather(out))
             out = out + self.factors.solve_all(right - times(self._rows, whole))
-        vectors = [self.system.new_vector() for _ in range(out.shape[1])]
-        for vector, solution in zip(vectors, out[:inner].T, strict=True):
-            vector.array[:] = solution
-        return vectors, self.comm.bcast(out[inner:], root=self.comm.size - 1)
+        return self.system.vectors(out[:inner]), self.comm.bcast(out[inner:], root=self.comm.size - 1)
 
 
 def bordered_of(inertia: Inertia, borders: int) -> Bordered:
@@ -184,7 +181,7 @@ class Condensation:
             far, W = below - int((values < 0).sum()), Z @ H
         soft, doubt = int(abs(values).argmin()), TOLERANCE * inertia.scale
         if small := bool(abs(values[soft]) < SOFT * inertia.scale):
-            doubt = max(doubt, quotient_error(inertia.at(x).matrix, inertia.vector(W @ vectors[:, soft])))
+            doubt = max(doubt, quotient_error(inertia.at(x).matrix, self.system.new_vector(W @ vectors[:, soft])))
         rotated = float(abs(np.linalg.eigvalsh(inertia.sum(W.T @ inertia.weighed(W))) - 1.0).max())
         zero = int((abs(values) <= doubt).sum())
         return ReducedStiffness(H, self._rate(x, tangent, (H, W), central=small), far, W, rotated, zero)
@@ -203,7 +200,7 @@ class Condensation:
     def _by_bordered_matrix(self, x: PETSc.Vec, B: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
         """``far``, H and W where S is nearly singular, or is."""
         matrix, bordered = self.inertia.at(x).matrix, bordered_of(self.inertia, B.shape[1])
-        far = bordered.factor(matrix, [self.inertia.vector(column) for column in B.T])
+        far = bordered.factor(matrix, self.system.vectors(B))
         modes, G = bordered.solve()
         return far, _symmetric(-G), np.stack([w.array_r for w in modes], axis=1)
 
@@ -228,7 +225,7 @@ class Condensation:
         if phase.rows:
             rates = (system.at(ahead).generators - system.at(behind).generators) / length
             for i, weights in phase.broken.items():
-                rate = system.generators.vector(weights @ rates).array_r
+                rate = system.new_vector(weights @ rates).array_r
                 own = np.arange(*inertia.metric.getOwnershipRange()) == system.drifts[i]
                 term = np.outer(inertia.sum(W.T @ inertia.weighed(rate[:, None])[:, 0]), inertia.sum(own @ W))
                 out += term + term.T

@@ -7,7 +7,7 @@ from golden_cases import cases, distinct
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import Discretization, Solver, compat
+from rodfem import Discretization, Solver
 
 EXACT = 1e-14
 """Relative difference of sums that are added up in another order."""
@@ -42,7 +42,7 @@ def test_forms_of_every_scene(name: str) -> None:
         ours.assemble()
         theirs = PETSc.Mat().createAIJ(ours.size, nnz=ours.size[1], comm=PETSc.COMM_SELF)
         theirs.setLGMap(*ours.getLGMap())
-        compat.assemble_matrix(theirs, form.form, *system.maps(load))
+        fem.petsc.assemble_matrix(theirs, form.form)
         theirs.assemble()
         size = theirs.norm(PETSc.NormType.INFINITY)
         theirs.axpy(-1.0, ours)

@@ -51,6 +51,26 @@ def test_torsion_in_tables() -> None:
         assert section.rectangle(ratio, 1.0, **STEEL).J / ratio == pytest.approx(k, abs=6e-4)
 
 
+def test_without_dimensions_and_back() -> None:
+    """A steel strip a metre long, and in its own units: Euler's load, and the lowest frequency of a cantilever."""
+    strip, length = section.rectangle(30e-3, 1e-3, **STEEL), 1.0
+    scales = strip.scales(length)
+    plain = strip.scaled(scales)
+    assert (plain.bending[0], plain.mass) == pytest.approx((1.0, 1.0), rel=1e-14)
+    assert plain.bending[1] == pytest.approx(900.0, rel=1e-12)
+    for name in ("twisting", "stretching", "shearing"):
+        ratio = np.array(getattr(strip, name)) / strip.bending[0] * (1.0 if name == "twisting" else length**2)
+        np.testing.assert_allclose(getattr(plain, name), ratio, rtol=1e-12)
+    second = 30e-3 * 1e-9 / 12
+    assert pi**2 / 4 * scales.force == pytest.approx(pi**2 / 4 * 210e9 * second, rel=1e-14)
+    by_hand = 1.875104068711961**2 * np.sqrt(210e9 * second / (7850.0 * 30e-6))
+    assert 1.875104068711961**2 * scales.frequency == pytest.approx(by_hand, rel=1e-14)
+    with pytest.raises(InputError, match="no density"):
+        section.circle(1.0, E=1.0, nu=0.3).scales(1.0).frequency  # noqa: B018
+    with pytest.raises(InputError, match="length is -1"):
+        strip.scales(-1.0)
+
+
 def test_limits() -> None:
     """An ellipse of equal axes, and a tube of a small bore, are circles; a thin tube has half its area in shear."""
     circle = section.circle(0.5, **STEEL)

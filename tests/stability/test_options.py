@@ -8,10 +8,7 @@ import pytest
 from petsc4py import PETSc
 from small_states import plain
 
-from rodfem.errors import ConvergenceError
 from rodfem.fem.system import System
-from rodfem.kumar_healey.coordinates import Coordinates
-from rodfem.kumar_healey.reduction import ReducedPencil
 from rodfem.stability.assessment import Assessor, in_interval
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -72,14 +69,3 @@ def test_symmetric_pencil(options: PETSc.Options) -> None:
     assert solver.getTolerances()[0] == 1e-8
     assert solver.getKrylovSchurKSP().getPC().getFactorMatrix().getMumpsIcntl(7) == ORDERING
     np.testing.assert_allclose(sorted(solver.getEigenvalue(i).real for i in range(3)), expected, rtol=1e-8)
-
-
-def test_reduced_pencil(options: PETSc.Options) -> None:
-    system, x = cord()
-    reduction = ReducedPencil(Coordinates(system).assemble(x))
-    expected = reduction.nearest(3, -30.0).values
-    options["rodfem_eps_tol"] = 1e-11
-    np.testing.assert_allclose(reduction.nearest(3, -30.0).values, expected, rtol=1e-9)
-    options["rodfem_eps_ncv"] = 3
-    with pytest.raises(ConvergenceError, match="ncv"):
-        reduction.nearest(3, -30.0)
