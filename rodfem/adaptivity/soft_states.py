@@ -298,7 +298,8 @@ class SoftRows:
 
     def _leave_out_doubtful(self, branch: Branch, *, family: bool) -> None:
         """Make rows of special points that are zeros of the mesh, not of the rod."""
-        rows = [p for p in branch.points if not any(p is s.point for s in branch.special)]
+        singular = {id(s.point) for s in branch.special if s.kind.singular}
+        rows = [p for p in branch.points if id(p) not in singular]  # with loads asked for, and the end
         left_out = [_is_of_the_mesh(s, rows) for s in branch.special]
         for s in compress(branch.special, left_out):
             self._of(s.point.mesh).examine(s.point, fixed_load=False, compare=True, family=family)

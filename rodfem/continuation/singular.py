@@ -351,7 +351,7 @@ class SingularSystem:
         if self._section is not None:
             own = self._own(at)
             table = np.vstack([at.rows[m - k :], self._plane(at, self._section, moved, t)]) @ own
-            size = abs(table[:, 1:]).max(axis=1)
+            size = np.maximum(abs(table[:, 1:]).max(axis=1), TINY)
             share = (own @ [1.0, *np.linalg.solve(table[:, 1:] / size[:, None], -table[:, 0] / size)])[1:]
         else:  # in natural units of eigenvalues and loads: what these do not determine, a free motion, stays as it is
             units, least = np.array([self.solver.units.load, *np.ones(m)]), np.full(m + 1, self.inertia.scale)
