@@ -80,6 +80,12 @@ def folder(text: str) -> Path:
     return Path(text)
 
 
+def run_folder(text: str) -> Path:
+    """Folder of a run, which a file in it may name."""
+    named = folder(text)
+    return named.parent if named.is_file() else named
+
+
 @contextmanager
 def sentences(parser: Parser) -> Iterator[None]:
     """Bad input, and what fails for a reason that is known, ends with one sentence and status 2."""

@@ -16,7 +16,7 @@ from shutil import get_terminal_size
 from textwrap import fill
 
 import rodfem
-from rodfem.app.cli import Parser, complain, folder
+from rodfem.app.cli import Parser, complain, folder, run_folder
 from rodfem.errors import InputError, SetupError
 from rodfem.ranks import end_quietly
 
@@ -68,7 +68,7 @@ def convert(words: Sequence[str]) -> None:
     from rodfem.whole_files import writing
 
     parser = Parser(prog="rodfem convert", description=_summary(convert))
-    parser.add_argument("folder", type=folder, help="that of a run, as results/cord")
+    parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
     parser.add_argument("--to", dest="format", choices=FORMATS, default="vtkhdf", help="format (default vtkhdf)")
     parser.add_argument("--output", type=folder, metavar="DIR", help="folder for the files (default FOLDER/FORMAT)")
     options = parser.parse_args(words)
@@ -105,7 +105,7 @@ def info(words: Sequence[str]) -> None:
     from rodfem.output.words import special_lines
 
     parser = Parser(prog="rodfem info", description=_summary(info))
-    parser.add_argument("folder", type=folder, help="that of a run, as results/cord")
+    parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
     path = parser.parse_args(words).folder / "diagram.json"
     needs = ("scene", "parameter", "constants", "branches", "meshes", "discretization", "ordinate", "range")
     data = read_json(path, DIAGRAM, needs)
@@ -172,7 +172,7 @@ def view(words: Sequence[str]) -> None:
     from rodfem.report.page import write_report
 
     parser = Parser(prog="rodfem view", description=_summary(view))
-    parser.add_argument("folder", type=Path, help="that of a run, as results/cord")
+    parser.add_argument("folder", type=run_folder, help="that of a run, as results/cord")
     parser.add_argument("--output", type=Path, help="page to write (default: report.html in the folder)")
     parser.add_argument("--no-open", action="store_true", help="write the page, and open no browser")
     given = parser.parse_args(words)

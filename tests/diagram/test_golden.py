@@ -83,5 +83,5 @@ def test_nothing_has_changed(name: str) -> None:
 def test_index_of_every_row(name: str) -> None:
     """By three other methods; ``python -m tests.every_row`` does the same for all conservative scenes."""
     rows, wrong = disagreements(name)
-    assert rows > 40
+    assert rows > 30
     assert not wrong
