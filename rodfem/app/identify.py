@@ -96,15 +96,25 @@ def identify(
     scenes, every = [scene] if isinstance(scene, Scene) else [*scene], [data] if isinstance(data, Mapping) else [*data]
     if not len(scenes) == len(every) > 0:
         raise InputError(f"There are {len(scenes)} scenes and {len(every)} sets of data: give one for each.")
-    fields = dict(unknown) if isinstance(unknown, Mapping) else {}
-    chosen = [n for name, field in fields.items() for n in names(name, field)] or list(unknown)
-    mesh, tables = discretization or Discretization(), [_tables(one, deviations) for one in every]
-    models = [_Model(with_fields(rod, fields), chosen, own, mesh) for rod, own in zip(scenes, tables, strict=True)]
-    kinds = dict.fromkeys(kind for own in tables for kind in own)
-    largest = {kind: max(float(abs(own[kind][:, -1]).max()) for own in tables if kind in own) for kind in kinds}
-    sizes = deviations or (largest if len(kinds) > 1 else dict.fromkeys(kinds, 1.0))
-    weights = [np.full(model.count(kind), sizes[kind]) for model in models for kind in model.tables]
-    return _fitted(models, np.concatenate(weights), known=bool(deviations))
+    fields, tables = dict(unknown) if isinstance(unknown, Mapping) else {}, [_tables(one, deviations) for one in every]
+    given = _chosen(fields) or list(unknown), discretization or Discretization()
+    models = [_Model(with_fields(rod, fields), own, *given) for rod, own in zip(scenes, tables, strict=True)]
+    return _fitted(models, _weights(models, deviations), known=bool(deviations))
+
+
+def _chosen(fields: Mapping[str, Field]) -> list[str]:
+    """Names of the numbers of all fields."""
+    return [n for name, field in fields.items() for n in names(name, field)]
+
+
+def _weights(models: Sequence[_Model], deviations: Mapping[str, float] | None) -> np.ndarray:
+    """Deviations (m,) of the residuals, as given, or all one, of several kinds of data the largest of each kind."""
+    sizes = dict[str, float]()
+    for model in models:
+        for kind, table in model.tables.items():
+            sizes[kind] = max(sizes.get(kind, 0.0), float(abs(table[:, -1]).max()))
+    sizes = dict(deviations or (sizes if len(sizes) > 1 else dict.fromkeys(sizes, 1.0)))
+    return np.concatenate([np.full(model.count(kind), sizes[kind]) for model in models for kind in model.tables])
 
 
 def _fitted(models: Sequence[_Model], weights: np.ndarray, *, known: bool) -> Identified:
@@ -184,7 +194,7 @@ def _covariance(J: np.ndarray, size: np.ndarray, chosen: Sequence[str]) -> np.nd
 class _Model:
     """Residuals of the data of a scene, and their derivatives in the ``chosen`` constants."""
 
-    def __init__(self, scene: Scene, chosen: list[str], tables: dict[str, np.ndarray], mesh: Discretization) -> None:
+    def __init__(self, scene: Scene, tables: dict[str, np.ndarray], chosen: list[str], mesh: Discretization) -> None:
         for name in chosen:
             scene.check_constant(name)
         self.scene, self.tables, self.chosen = scene, tables, chosen

@@ -38,7 +38,6 @@ from rodfem.whole_files import locked
 Work = Callable[[Scene], dict[str, Any]]
 OF_POINT = dict(zip(NUMBERS, ("load", "error_estimate", "ordinate", "negative_before", "negative_after"), strict=True))
 """What a family has of a special point, and the entries of files."""
-WIDTH = 40  # of a bar
 MODELS = 8  # traced rods, with those continued from them, that others may be continued from
 TRIED = 2  # of these, the nearest ones, before a rod is traced
 
@@ -171,15 +170,7 @@ def family(
     :class:`~rodfem.errors.SetupError` without xarray.
     """
     xarray = optional("xarray", "tables")
-    values = {name: np.array(reals(f"over[{name!r}]", column, (0.5, 1.0))) for name, column in over.items()}
-    if not values or scene.load in values or not all(map(len, values.values())):
-        raise InputError(
-            f"over is {over!r}: give values of constants other than the load, as in {{'A': (-1.5, -1.0)}}."
-        )
-    for name, column in values.items():
-        for value in column.tolist():
-            scene.check_constant(name)
-            scene.parameters[name].check(name, value)
+    values = _columns_of(scene, over)
     each = [*product(*(column.tolist() for column in values.values()))]
     rods = _Rods(scene, [*values], np.array([np.ptp(x) or 1.0 for x in values.values()]), (plan, discretization))
     common, how = key_of(scene), dict[str, Any](comm=MPI.COMM_WORLD, progress=bar) | sharing
@@ -192,11 +183,25 @@ def family(
     return xarray.Dataset(data, values, {"scene": scene.name, "load": scene.load})
 
 
+def _columns_of(scene: Scene, over: Mapping[str, Sequence[float]]) -> dict[str, np.ndarray]:
+    """Values of each constant; raises :class:`InputError` for what is none, and for a value that is not admissible."""
+    values = {name: np.array(reals(f"over[{name!r}]", column, (0.5, 1.0))) for name, column in over.items()}
+    if not values or scene.load in values or not all(map(len, values.values())):
+        raise InputError(
+            f"over is {over!r}: give values of constants other than the load, as in {{'A': (-1.5, -1.0)}}."
+        )
+    for name, column in values.items():
+        scene.check_constant(name)
+        for value in column.tolist():
+            scene.parameters[name].check(name, value)
+    return values
+
+
 def bar(done: int, count: int) -> None:
     """Draw a bar of what is done of all rods, if the errors of the program go to a terminal."""
     if sys.stderr.isatty():
-        part = WIDTH * done // count
-        sys.stderr.write(f"\r[{'#' * part}{' ' * (WIDTH - part)}] {done} of {count} rods" + "\n" * (done == count))
+        drawn = f"{'#' * (40 * done // count):<40}"
+        sys.stderr.write(f"\r[{drawn}] {done} of {count} rods" + "\n" * (done == count))
         sys.stderr.flush()
 
 

@@ -19,7 +19,7 @@ there of the density ``dlam/dp(s)``.  What acts at points, as a load at an end, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from petsc4py import PETSc
@@ -63,23 +63,30 @@ class Adjoint:
         self._noise = [100.0 * rounding(matrix, v, x) + 1e-15 * inertia.scale for v in null]  # round-off
         if self.fold:
             return np.array([[column.dot(null[0])]])
-        count = len(null)
-        images, rates = dict[tuple[int, int], PETSc.Vec](), np.zeros((count, count))
-        for i, v in enumerate(null):
-            for step, weight in SHARP:
-                there, share = inertia.moved(x + v * (step * DIFFERENCE)), weight / (2 * DIFFERENCE)
-                rates[i] += [share * there.border.dot(other) for other in null]
-                for j in range(i, count):
-                    images.setdefault((i, j), self.system.new_vector()).axpy(share, states.image(there.matrix, null[j]))
+        images, rates = self._along(null, states)
 
         def across(image: PETSc.Vec) -> PETSc.Vec:
             (y, *_), forces = bordered.solve([-image])
             return combine([y, *V], np.array([1.0, *(N @ states.rest(N, G, -forces[:, 0]))]))
 
-        half = {pair: across(image) for pair, image in images.items()}
-        self.y = [[half[min(i, j), max(i, j)] for j in range(count)] for i in range(count)]
+        half, each = {pair: across(image) for pair, image in images.items()}, range(len(null))
+        self.y = [[half[min(i, j), max(i, j)] for j in each] for i in each]
         rates += [[y.dot(column) for y in row] for row in self.y]
         return (rates + rates.T) / 2
+
+    def _along(
+        self, null: Sequence[PETSc.Vec], states: SingularSystem
+    ) -> tuple[dict[tuple[int, int], PETSc.Vec], np.ndarray]:
+        """``D(S v_i) v_j`` for i <= j, and the derivatives (k, k) of ``v_j . F_lam`` along null vectors ``v_i``."""
+        images, rates = dict[tuple[int, int], PETSc.Vec](), np.zeros((len(null), len(null)))
+        for i, v in enumerate(null):
+            for step, weight in SHARP:
+                there = self.solver.inertia.moved(self.x + v * (step * DIFFERENCE))
+                share = weight / (2 * DIFFERENCE)
+                rates[i] += [share * there.border.dot(other) for other in null]
+                for j in range(i, len(null)):
+                    images.setdefault((i, j), self.system.new_vector()).axpy(share, states.image(there.matrix, null[j]))
+        return images, rates
 
     def _normalise(self, rates: np.ndarray) -> None:
         """Take null vectors by which ``R``, the ``rates`` (k, k), has plus or minus one on its diagonal."""

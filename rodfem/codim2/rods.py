@@ -20,7 +20,7 @@ from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound
 from rodfem.codim2.criteria import FEWER, IMPERFECT, restoration
-from rodfem.continuation.branch import Branch
+from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.singular import SingularState, SingularSystem
@@ -34,8 +34,7 @@ WEIGHTS = [[1.0], [2.0, -1.0], [3.0, -3.0, 1.0], [4.0, -6.0, 4.0, -1.0]]
 NUMBERS = ("critical_load", "error", "ordinate", "index_before", "index_after")
 """What a family has of a special point."""
 NEAR = 0.05  # part of the range of loads within which a special point has the modes of others in its border
-KEPT = 400
-"""Rods that are kept to continue from."""
+KEPT = 400  # rods to continue from
 Values = tuple[float, ...]
 
 
@@ -53,29 +52,17 @@ class Rods:
 
     def __init__(self, branch: Branch, names: Sequence[str], *, error_bars: bool) -> None:
         """Take a ``branch`` that :func:`continued` allows."""
-        self.special = [special for special in branch.special if not special.kind.request]
-        points, rows = branch.points, [special.row for special in self.special]
+        self.special, points = specials(branch), branch.points
         self.solver: BranchSolver = points[0].own_solver
-        self.system, self.names = self.solver.system, names
-        self.ends = points[0].load, points[-1].load
-        self.indices = [points[0].negative, *(special.negative_after for special in self.special)]
-        self.indices += [] if rows else self.indices
-        witnesses = [0, *((a + b) // 2 for a, b in pairwise(rows)), -1]
-        known = Rod(
-            [s.point.x for s in self.special],
-            [[*s.null_vectors] for s in self.special],
-            [points[row].x for row in witnesses],
-        )
-        self.richer = Enriched(self.solver) if error_bars and self.special else None
+        self.system, self.names, self.ends = self.solver.system, names, (points[0].load, points[-1].load)
+        changes = [special.negative_after for special in self.special] or [points[0].negative]
+        self.indices = [points[0].negative, *changes]
+        self.known, self.finer = dict[Values, Rod](), dict[Values, Rod]()
         first = tuple(self.system.scene.parameters[name].value for name in names)
-        self.known: dict[Values, Rod] = {first: known}
-        self.finer: dict[Values, Rod] = {}
+        self.known[first] = _traced(branch)
+        self.richer = Enriched(self.solver) if error_bars and self.special else None
         if self.richer is not None:
-            self.finer[first] = Rod(
-                [self.richer.transfer(x, state=True) for x in known.points],
-                [[self.richer.transfer(v, state=False) for v in vectors] for vectors in known.null],
-                [],
-            )
+            self.finer[first] = _transferred(self.known[first], self.richer)
 
     def distance(self, values: Values, sizes: np.ndarray) -> float:
         """Distance of the nearest known rod, in ``sizes`` of the constants."""
@@ -166,6 +153,20 @@ class Rods:
             yield {"kind": str(special.kind)} | dict(zip(NUMBERS, numbers, strict=True))
 
 
+def _traced(branch: Branch) -> Rod:
+    """Rod of a branch, with the rows half way between special points as witnesses, and those at the ends."""
+    special, points = specials(branch), branch.points
+    middle = [points[(a.row + b.row) // 2].x for a, b in pairwise(special)]
+    null = [[*s.null_vectors] for s in special]
+    return Rod([s.point.x for s in special], null, [points[0].x, *middle, points[-1].x])
+
+
+def _transferred(rod: Rod, richer: Enriched) -> Rod:
+    """Special points of a rod on a richer mesh."""
+    null = [[richer.transfer(v, state=False) for v in vectors] for vectors in rod.null]
+    return Rod([richer.transfer(x, state=True) for x in rod.points], null, [])
+
+
 def _keep(known: dict[Values, Rod], values: Values, rod: Rod) -> None:
     """Keep a rod to continue from, and forget the oldest one where there are many."""
     known[values] = rod
@@ -189,9 +190,14 @@ def in_line(known: Mapping[Values, Rod], values: Values, sizes: np.ndarray) -> l
     return out
 
 
+def specials(branch: Branch) -> list[SpecialPoint]:
+    """Special points of a branch but for loads that were asked for, and ends."""
+    return [special for special in branch.special if not special.kind.request]
+
+
 def continued(branch: Branch, span: tuple[float, float]) -> bool:
     """Whether a ``branch`` from end to end of the ``span`` has folds and branch points alone, on one mesh, no doubt."""
-    special, points = [s for s in branch.special if not s.kind.request], branch.points
-    alone = all(s.kind.singular and s.resolved is not False and not s.nearby for s in special)
+    points = branch.points
+    alone = all(s.kind.singular and s.resolved is not False and not s.nearby for s in specials(branch))
     whole = {points[0].load, points[-1].load} == {*span} and len({id(p.solver) for p in points}) == 1
     return alone and whole and not branch.unexplained

@@ -167,12 +167,18 @@ def special_values(entry: Data) -> dict[str, Any]:
     read = [e.name for e in SPECIAL if e.of is None and e.name not in ("multiplicity", "resolved", "note")]
     values = {ATTRIBUTES.get(name, name): _number(entry.get(name)) for name in read}
     pairs = {name: tuple(map(_number, pair)) for name, pair in (entry.get("derivatives") or {}).items()}
-    values["densities"] = {
-        name: (np.array(s), np.array(means)) for name, (s, means) in (entry.get("densities") or {}).items()
+    values |= {
+        "derivatives": pairs,
+        "densities": _densities(entry),
+        "resolved": entry.get("resolved"),
+        "note": entry.get("note") or "",
     }
-    values |= {"derivatives": pairs, "resolved": entry.get("resolved"), "note": entry.get("note") or ""}
     values["connects_to"] = tuple(entry["meets"]) if entry["meets"] else None
     return values | {"law": _law(entry["law"]) if entry["law"] else None}
+
+
+def _densities(entry: Data) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    return {name: (np.array(s), np.array(means)) for name, (s, means) in (entry.get("densities") or {}).items()}
 
 
 def _law(law: Data) -> NormalForm:
