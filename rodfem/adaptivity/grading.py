@@ -82,7 +82,7 @@ class SmoothnessIndicator:
     def __call__(self, x: PETSc.Vec, directions: Sequence[PETSc.Vec] = ()) -> Smoothness:
         """Smoothness of a state and of changes of it (null vectors) together."""
         shape = self.solver.shape
-        starts, rows = shape.gather(shape.start), shape.gather(self._squares(x, directions))
+        starts, rows = shape.system.whole(shape.start), shape.system.whole(self._squares(x, directions))
         order = np.argsort(starts)
         vertices = np.append(starts[order], self.solver.system.scene.interval[1])
         return _decay(vertices, np.sqrt(rows[order]))

@@ -257,7 +257,7 @@ def _of_support(resultants: Resultants, x: PETSc.Vec, side: int, contact: np.nda
         return Reaction(np.zeros(3), np.zeros(3))
 
     def summed(mine: Any) -> Any:
-        return shape.gather(np.asarray(mine)[None]).sum(axis=0)
+        return system.whole(np.asarray(mine)[None]).sum(axis=0)
 
     state, (force, moment) = shape.smooth(system.at(x)), contact.copy()
     local = state.local.copy()

@@ -51,7 +51,7 @@ class Shape:
         self._held_strains = np.array([0.0 if i in free else x for i, x in enumerate(UNDEFORMED)])
         self._strains = np.eye(len(UNDEFORMED))[list(free)]
         self._probe_weights = [self.weights(s) for s in system.scene.ordinate.places]
-        starts = self.gather(self.start)
+        starts = system.whole(self.start)
         self._sequence = np.argsort(starts)
         self._first = np.searchsorted(starts[self._sequence], self.start)
         left = self.from_left(self.start)[:, None, None]
@@ -179,13 +179,9 @@ class Shape:
 
     # --- along the rod -----------------------------------------------------------------------------------------
 
-    def gather(self, values: np.ndarray) -> np.ndarray:
-        """Rows of all ranks, one for each element, in the order of the ranks."""
-        return values if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(values))
-
     def from_left(self, values: np.ndarray) -> np.ndarray:
         """Rows of all ranks, one for each element, from left to right."""
-        return self.gather(values)[self._sequence]
+        return self.system.whole(values)[self._sequence]
 
     def joined(self, values: np.ndarray) -> np.ndarray:
         """Values of a continuous field at its nodes from left to right, (cells, nodes, ...) -> (m, ...)."""

@@ -163,6 +163,10 @@ class System:
         """Sum over the ranks."""
         return own if self.comm.size == 1 else np.asarray(self.comm.allreduce(own, op=MPI.SUM))
 
+    def whole(self, own: np.ndarray) -> np.ndarray:
+        """Rows of all ranks, in their order."""
+        return own if self.comm.size == 1 else np.concatenate(self.comm.allgather(own))
+
     def weighed(self, own: np.ndarray) -> np.ndarray:
         """Metric times vectors of which this rank has these rows each, (count, own rows)."""
         if self._weights is not None:

@@ -15,21 +15,7 @@ The pencil ``(K C; C^t 0) x = mu (M 0; 0 0) x`` of :mod:`rodfem.stability.pencil
 A ring is closed by ``q(l) = +-q(0)``.  The norms being fulfilled, three of these four equations are independent: in
 tangent and compatible coordinates those across ``q(0)``, one in the plane.
 
-Sizes for ``N`` elements of degree ``d``, ``f`` free strains, one end clamped (``e = 1``) or both (``e = 2``), ``h``
-held components of the centreline's ends, ``g`` scalar contact forces (reduced formulation):
-
-    coordinates              rows of K and C                                 columns of C
-    full, pointwise          4 (dN + 1 - e) + f dN + 3 (dN + 1) - h          dN + 1 - e + 3 dN
-    full, reduced            4 (dN + 1 - e) + f dN                           dN + 1 - e + g
-    tangent, pointwise       3 (dN + 1 - e) + f dN + 3 (dN + 1) - h          3 dN
-    tangent, reduced         3 (dN + 1 - e) + f dN                           g
-    compatible, pointwise    3 (dN + 1 - e) + 3 (dN + 1) - h                 (3 - f) dN
-
-For ``d = 1`` these are the sizes of the paper with ``n = N`` but for what discontinuous fields change.
-Cord: ``(6n - 5) x (6n - 5)`` and ``3n`` columns.  A continuous multiplier has ``3n + 3`` components less the known
-``n3`` at the end, ``3n + 2``; a discontinuous one has three in each cell, and dead forces enter the load instead.
-Hemitropic, compatible: ``6 (n - 1)`` and ``2n`` columns.  Hemitropic, reduced: ``4n - 3`` rows and 3 columns, where a
-continuous stretch would have one value more, ``4n - 2``.
+Sizes for linear elements are those of ``docs/paper.md``.
 """
 
 from __future__ import annotations
@@ -69,7 +55,7 @@ class Coordinates:
         self.blocks = Blocks(system, norms=coordinates == "full")
         f = system.fields
         self._dofs = f.dofs["q"].reshape(-1, 4) if "q" in f.dofs else np.zeros((0, 4), dtype=int)
-        every = self.blocks.gathered(f.number[self._dofs])
+        every = self.system.whole(f.number[self._dofs])
         first, chosen = np.unique(every[:, 0], return_index=True)
         self._nodes = chosen[first >= 0]
         self.quaternions = every[self._nodes]  # global numbers of the components of q at each free node
@@ -98,7 +84,7 @@ class Coordinates:
             if not self.system.scene.units.ordinary:
                 weighed.pointwiseMult(weighed, self.blocks.sizes)
                 weighed.scale(1.0 / weighed.norm())
-            images.append(pencil.T.T @ self.blocks.gathered(weighed.array_r.real)[self.blocks.rows])
+            images.append(pencil.T.T @ self.system.whole(weighed.array_r.real)[self.blocks.rows])
         C = sp.hstack([pencil.C, np.stack(images, axis=1)]).tocsr()
         return replace(pencil, C=C, place=np.append(pencil.place, np.full(len(modes), np.nan)))
 
@@ -130,7 +116,7 @@ class Coordinates:
     def _spins(self, state: State) -> sp.csr_matrix:
         """Square matrix with columns of a spin in the places of q1, q2, q3, and one for each other unknown."""
         quads, count = self._quads, len(self.blocks.rows)
-        a, b, c, d = self.blocks.gathered(state.local[self._dofs])[self._nodes].T / 2
+        a, b, c, d = self.system.whole(state.local[self._dofs])[self._nodes].T / 2
         values = np.array([[-b, -c, -d], [a, d, -c], [-d, a, b], [c, -b, a]])  # of 1/2 (0, theta) q
         same = np.ones(count)
         same[quads.ravel()] = 0.0
@@ -141,7 +127,7 @@ class Coordinates:
         """Keep of the equations that close a ring's rotation the combinations across the quaternion at its end."""
         f, count = self.system.fields, len(self.blocks.columns)
         end = np.isclose(f.coordinates(f.discretization.degree), self.system.scene.interval[1])
-        q = self.blocks.gathered(state.values("q")[end])[0]
+        q = self.system.whole(state.values("q")[end])[0]
         closing = {f.scalars[x.name]: x.component for x in f.unknown_scalars if x.group == CLOSING_MOMENT}
         columns = np.searchsorted(self.blocks.columns, np.array(list(closing), dtype=int))
         across = np.linalg.svd(q[list(closing.values())][None])[2][1:].T
@@ -159,10 +145,10 @@ class Coordinates:
         f, blocks = self.system.fields, self.blocks
         cells = [f.number[f.dofs[name][: f.owned_cells]].reshape(f.owned_cells, -1) for name in ("v", "n")]
         rows, columns = (
-            pencil.where[name][np.searchsorted(blocks.numbers[name], blocks.gathered(own))]
+            pencil.where[name][np.searchsorted(blocks.numbers[name], self.system.whole(own))]
             for name, own in zip(("v", "n"), cells, strict=True)
         )
-        middle = blocks.gathered(f.vertices[: f.owned_cells].mean(axis=1))
+        middle = self.system.whole(f.vertices[: f.owned_cells].mean(axis=1))
         (n, a), b, (m, p) = rows.shape, columns.shape[1], pencil.C.shape
         C_v = pencil.C[rows.ravel()][:, columns.ravel()]  # block diagonal
         C_v.eliminate_zeros()

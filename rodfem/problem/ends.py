@@ -447,9 +447,7 @@ def sliding_hinge(
     if not 0 < largest < np.inf:
         what = "zero" if largest == 0 else f"{tuple(direction.tolist())}"
         raise SceneError(f"The direction in which a hinge slides is {what}: give one, as in along=(0.6, 0.0, 0.8).")
-    direction = direction / largest
-    direction /= np.linalg.norm(direction)
-    direction = np.where(abs(direction) > NEGLIGIBLE, direction, 0.0)
+    direction = np.where(abs(direction) > NEGLIGIBLE * largest, direction / largest, 0.0)
     unit = tuple((direction / np.linalg.norm(direction)).tolist())
     push = force if force is None else lambda c: tuple(t * value_of(force, c) for t in unit)
     return SlidingHinge(position, rotation, push, hinge=axis, guide=unit)

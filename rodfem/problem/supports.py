@@ -40,10 +40,11 @@ def supports_of(scene: Scene, sample: Sample, first: dict[str, Support] | None =
     for i, x in enumerate(scene.attachments, start=1):
         places[f"attachment {i}"] = x.s, End(force=x.force, follower=x.follower, energy=x.energy), x.mass
     known: dict[str, Support | None] = {**(first or dict.fromkeys(places))}
-    return {name: _support(scene, sample, *place, known[name]) for name, place in places.items()}
+    return {name: _support(scene, sample, place, known[name]) for name, place in places.items()}
 
 
-def _support(scene: Scene, sample: Sample, s: float, end: End, mass: Any, first: Support | None) -> Support:
+def _support(scene: Scene, sample: Sample, where: tuple[float, End, Any], first: Support | None) -> Support:
+    s, end, mass = where
     start = np.array(IDENTITY) if scene.start is None else np.asarray(scene.start(np.array([s])), dtype=float)[0]
     frame, loads, c = start / np.linalg.norm(start), np.zeros((2, 3)), scene.constants(float(sample["load"]), s)
     springs = np.array([first.translation_stiffness, first.rotation_stiffness]) if first else np.zeros((2, 3, 3))

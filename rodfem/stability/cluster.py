@@ -170,7 +170,7 @@ def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
     if np.linalg.matrix_rank(product) < size:
         raise ConvergenceError(f"the left vectors of {size} eigenvalues near {mean:.6g} are not found")
     W = W @ np.linalg.inv(product).T
-    rows, every = local_rows(pencil.matrix), np.concatenate(pencil.system.comm.allgather(V))
+    rows, every = local_rows(pencil.matrix), pencil.system.whole(V)
     B = pencil.product(W, (rows @ every).real) - mean * np.eye(size)
 
     def of(left: np.ndarray) -> float:

@@ -47,13 +47,11 @@ def require_independent_constraints(shape: Shape, x: PETSc.Vec, start: PETSc.Vec
     if start is not None and system.norm(start - x) < TAUT:
         x = start
     pencil = Blocks(system).assemble(x)
-    if not pencil.C.shape[1]:
-        return
     scalars = [u for u in system.fields.unknown_scalars if u.multiplier]
-    reach = [pencil.where["scalars"][i] for i, u in enumerate(scalars) if u.group.name == CONTACT_FORCE]
-    sigma, w = weakest(pencil, np.append(pencil.where.get(CONTACT_FORCE, []), reach).astype(int), system.scene.length)
-    if sigma <= WEAK:
-        names = dependent_equations(pencil, [u.group.equation.format(u.component + 1) for u in scalars], w)
+    reach = pencil.where["scalars"][[u.group.name == CONTACT_FORCE for u in scalars]]
+    found = weakest(pencil, np.append(pencil.where.get(CONTACT_FORCE, reach[:0]), reach), system.scene.length)
+    if found and found[0] <= WEAK:
+        names = dependent_equations(pencil, [u.group.equation.format(u.component + 1) for u in scalars], found[1])
         remedy = TIGHT if taut(shape, x) else "remove those that follow from the others."
         raise SceneError(f"Constraints depend on one another ({names}): {remedy}")
 
@@ -90,12 +88,14 @@ def taut_where_it_turns(shape: Shape, x: PETSc.Vec) -> str:
     )
 
 
-def weakest(pencil: Pencil, reach: np.ndarray, length: float) -> tuple[float, np.ndarray]:
-    """Smallest singular value of the gradients, each over its norm, and their multipliers (p,).
+def weakest(pencil: Pencil, reach: np.ndarray, length: float) -> tuple[float, np.ndarray] | None:
+    """Smallest singular value of the gradients, each over its norm, and their multipliers (p,); None without any.
 
     Those of positions, at the places ``reach``, are over the ``length`` of the rod at least: where it is taut one
     vanishes.
     """
+    if not pencil.C.shape[1]:
+        return None
     units = np.ones(pencil.C.shape[0])
     units[[i for name in ("r", "ends") for i in pencil.where.get(name, ())]] = length
     C = sp.diags(units) @ pencil.C

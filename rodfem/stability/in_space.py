@@ -49,8 +49,7 @@ class InSpace:
 
     def _share(self, v: PETSc.Vec) -> float:
         """Part of the squared norm of a vector of norm 1 that is out of the plane."""
-        own = float((v.array_r * (self.inertia.metric * v).array_r).real[self._out].sum())
-        return float(self.system.comm.allreduce(own, op=MPI.SUM))
+        return float(self.system.sum(np.sum((v.array_r * (self.inertia.metric * v).array_r)[self._out])))
 
     def at(self, x: PETSc.Vec) -> Factored:
         """Second variation in space at the planar equilibrium ``x``; :class:`SceneError` if that is none in space.

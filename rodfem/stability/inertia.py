@@ -72,7 +72,7 @@ class Inertia:
     """
 
     def __init__(self, system: System) -> None:
-        self.system, fields = system, system.fields
+        self.system, self.sum, fields = system, system.sum, system.fields
         self.matrix, self.border = system.state_matrix(load=True), system.new_vector()
         self._axis, self._without_load = system.load_axis(), system.new_vector()
         self._without_load.set(1.0)
@@ -182,16 +182,12 @@ class Inertia:
 
     def weighed(self, own: np.ndarray) -> np.ndarray:
         """Metric times vectors, the columns of ``own`` (own rows, count)."""
-        return times(self._weights, self._whole(own))
+        return times(self._weights, self.system.whole(own))
 
     def times(self, own: np.ndarray) -> np.ndarray:
         """The matrix times vectors, the columns of ``own`` (own rows, count)."""
         rows = local_rows(self.matrix).real if self._shared is None else self._shared.matrix
-        return times(rows, self._whole(own))
-
-    def _whole(self, own: np.ndarray) -> np.ndarray:
-        """Rows of all ranks."""
-        return own if self.system.comm.size == 1 else np.concatenate(self.system.comm.allgather(own))
+        return times(rows, self.system.whole(own))
 
     def counted(self, factors: Factors, sigma: float, drifts: int) -> int:
         """Number of eigenvalues below ``sigma`` by ``factors`` of ``S - sigma M`` with ``drifts`` phase conditions.
@@ -228,10 +224,6 @@ class Inertia:
     def sizes(self, own: np.ndarray) -> np.ndarray:
         """Norms (k,) of vectors (own rows, k) in the metric."""
         return np.sqrt(np.maximum(self.sum((own * self.weighed(own)).sum(axis=0)), 0.0))
-
-    def sum(self, own: np.ndarray) -> np.ndarray:
-        """Sum over the ranks."""
-        return own if self.system.comm.size == 1 else np.asarray(self.system.comm.allreduce(own, op=MPI.SUM))
 
     def seed(self, i: int) -> PETSc.Vec:
         """Generic vector with components along all unknowns of fields, none along scalars."""

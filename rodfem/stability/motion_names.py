@@ -15,7 +15,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem.fem.state import State
@@ -59,9 +58,9 @@ class MotionNames:
         state = self.system.at(x)
         found = self.generators(x, state)
         rows = np.reshape(list(found.values()), (len(found), state.generators.shape[1]))
-        gram = self._sum(rows @ self.system.weighed(rows).T)
+        gram = self.system.sum(rows @ self.system.weighed(rows).T)
         own = np.array([v.array_r[: rows.shape[1]].real for v in vectors])
-        shares = self._sum(rows @ self.system.weighed(own).T)
+        shares = self.system.sum(rows @ self.system.weighed(own).T)
         return [self._name(state, v, list(found), gram, b) for v, b in zip(vectors, shares.T, strict=True)]
 
     def generators(self, x: PETSc.Vec, state: State) -> dict[str, np.ndarray]:
@@ -70,23 +69,19 @@ class MotionNames:
         They are of metric norm 1 and across the symmetries of the state, without those that vanish.
         """
         system, motions = self.system, self._generators.at(state)
-        before = self._sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
+        before = self.system.sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
         system.set_phase(x)
         for weights in system.phase.broken.values():
             g = weights @ state.generators
             image = system.weighed(g[None])[0]
-            motions = motions - np.outer(self._sum(motions @ image) / self._sum(g @ image), g)
-        after = self._sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
+            motions = motions - np.outer(self.system.sum(motions @ image) / self.system.sum(g @ image), g)
+        after = self.system.sum(np.einsum("ij,ij->i", motions, system.weighed(motions)))
         kept = after > DEPENDENT * np.maximum(before, DEPENDENT)
         return {name: motions[i] / np.sqrt(after[i]) for i, name in enumerate(self.motions) if kept[i]}
 
     @cached_property
     def _generators(self) -> Generators:
         return Generators(self.system, list(self.motions.values()))
-
-    def _sum(self, own: np.ndarray) -> np.ndarray:
-        """Sum over the ranks."""
-        return np.asarray(self.system.comm.allreduce(own, op=MPI.SUM))
 
     def _name(self, state: State, v: PETSc.Vec, names: list[str], gram: np.ndarray, b: np.ndarray) -> str:
         """Name of a vector by its products ``b`` with the motions of these ``names``, whose own are ``gram``."""
@@ -131,7 +126,7 @@ def squares(system: System, turned: np.ndarray, columns: np.ndarray) -> np.ndarr
     if "r" in f.dofs:
         moved = (changes[:, f.dofs["r"][cells]] ** 2 * size / system.scene.length**2).sum(axis=(1, 2, 3))[:, None]
     mine = np.hstack([(w**2 * size).sum(axis=(1, 2)), moved])
-    return np.asarray(mine if system.comm.size == 1 else system.comm.allreduce(mine))
+    return system.sum(mine)
 
 
 def name_of(system: System, turned: np.ndarray, columns: np.ndarray) -> str:

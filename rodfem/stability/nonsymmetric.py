@@ -308,7 +308,7 @@ class NonsymmetricPencil:
 
     def shares(self, basis: np.ndarray) -> np.ndarray:
         """Share (k,) of the vector of each eigenvalue of the spectrum in the span of a real ``basis`` (n, m)."""
-        whole = np.concatenate(self.system.comm.allgather(basis / self.solver.sizes.array_r.real[:, None]))
+        whole = self.system.whole(basis / self.solver.sizes.array_r[:, None])
         return inside(self.spectrum.dual.T @ whole[self.spectrum.heavy], self.spectrum.pairs.right)
 
     def motion(self, basis: np.ndarray) -> str:
@@ -317,9 +317,7 @@ class NonsymmetricPencil:
 
     def weighed(self, vectors: np.ndarray) -> np.ndarray:
         """``M X`` for real or complex vectors (n, k)."""
-        comm = self.system.comm
-        whole = vectors if comm.size == 1 else np.concatenate(comm.allgather(vectors))
-        return times(local_rows(self.mass).real, whole)
+        return times(local_rows(self.mass).real, self.system.whole(vectors))
 
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """``a^* b`` of all ranks' rows."""

@@ -184,7 +184,7 @@ class Blocks(PencilMatrices):
         """Global numbers of the unknowns, or multipliers, but for a field ``left_out``; ``last`` names the scalars."""
         f = self.system.fields
         names = [b.name for b in f.blocks if b.multiplier == multiplier and b.name != left_out]
-        numbers = {name: np.unique(self.gathered(f.number[f.dofs[name]].ravel())) for name in names}
+        numbers = {name: np.unique(self.system.whole(f.number[f.dofs[name]].ravel())) for name in names}
         numbers = {name: n[n >= 0] for name, n in numbers.items()}
         scalars = [f.scalars[x.name] for x in f.unknown_scalars if x.multiplier == multiplier]
         numbers[last] = np.array(scalars, dtype=int)
@@ -192,10 +192,6 @@ class Blocks(PencilMatrices):
         self.numbers |= numbers
         self.where |= {name: np.searchsorted(out, n) for name, n in numbers.items()}
         return out
-
-    def gathered(self, own: np.ndarray) -> np.ndarray:
-        """Rows of all ranks."""
-        return np.concatenate(self.system.comm.allgather(own))
 
     def own(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Which of some global ``numbers`` are rows of this rank, and their places in its part of a vector."""

@@ -113,8 +113,7 @@ class Bordered:
         right[inner:, len(columns) :] = np.eye(self.extra, self.k)
         with self.system.clock("solve"):
             out = self.factors.solve_all(right)
-            whole = out if self.comm.size == 1 else np.concatenate(self.comm.allgather(out))
-            out = out + self.factors.solve_all(right - times(self._rows, whole))
+            out = out + self.factors.solve_all(right - times(self._rows, self.system.whole(out)))
         return self.system.vectors(out[:inner]), self.comm.bcast(out[inner:], root=self.comm.size - 1)
 
 

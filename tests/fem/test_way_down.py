@@ -35,7 +35,7 @@ def test_a_step_is_uphill_where_it_is_too_long(
     assert step is not None
     blocks = Blocks(e.system)
     K = blocks.assemble(x).K
-    moved, own = blocks.gathered(step.array_r)[blocks.rows], blocks.own(blocks.rows)[1]
+    moved, own = e.system.whole(step.array_r)[blocks.rows], blocks.own(blocks.rows)[1]
     dual = np.ones(step.local_size, dtype=bool)
     dual[own] = False
     motion = step.copy()

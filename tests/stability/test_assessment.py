@@ -277,7 +277,9 @@ def test_round_off_is_no_independence() -> None:
 
     def least(C: list[list[float]], length: float) -> float:
         pencil = Pencil(unit, sp.csr_matrix(np.array(C)), unit, where, np.zeros(2))
-        return weakest(pencil, np.zeros(0, dtype=int), length)[0]
+        found = weakest(pencil, np.zeros(0, dtype=int), length)
+        assert found is not None
+        return found[0]
 
     assert least([[1.0, 1.0], [0.0, 1e-16], [0.0, 0.0]], 1.0) < 1e-15
     # a rotation and a position, in a rod of the length 1e-13
