@@ -144,13 +144,16 @@ def check_run(data: dict[str, Any], states: Path) -> None:
         )
 
 
-def curve_at(group: Mapping[str, Any], row: int, count: int) -> tuple[Floats, Floats, Floats]:
-    """Arclengths (count,), centreline (count, 3) and unit quaternions (count, 4) of a row of the group of a branch."""
+def curve_at(group: Mapping[str, Any], row: int, at: int | Floats) -> tuple[Floats, Floats, Floats]:
+    """Arclengths (m,), centreline (m, 3) and unit quaternions (m, 4) of a row of the group of a branch.
+
+    They are those given as ``at``, or as many as that, evenly spaced.
+    """
     known = np.isfinite(group["s"][row])  # the rows of a mesh with fewer nodes end in nan
     s, r, q = (np.asarray(group[name][row])[known] for name in ("s", "r", "q"))
     opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
     signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
-    at = np.linspace(s[0], s[-1], count)
+    at = np.linspace(s[0], s[-1], at) if isinstance(at, int) else at
     turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
     return at, CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
 

@@ -93,7 +93,13 @@ def _of_three(of: Callable[[Constants], float]) -> Callable[[Constants], tuple[f
 _no_rotary, _unit_rotary = _of_three(_massless), _of_three(_one)
 
 
-@dataclass(frozen=True)
+def _given(self: Inertia | Drag) -> str:
+    """Names of the functions that are not those by default, for ``repr``: functions have no text worth reading."""
+    names = (f.name for f in fields(self) if getattr(self, f.name) not in (f.default, _no_rotary))
+    return f"{type(self).__name__}({', '.join(f'{name}=...' for name in names)})"
+
+
+@dataclass(frozen=True, repr=False)
 class Inertia:
     """Mass ``rho_A(c)`` and rotary inertia ``rho_I(c)`` about the directors, both per unit length.
 
@@ -107,6 +113,8 @@ class Inertia:
     rho_A: Given = role_field(Role("mass per length", "f(c)", 0, along=True), _massless)
     rho_I: Given = role_field(Role("rotary inertia per length", "f(c)", 3, along=True), _unit_rotary)
 
+    __repr__ = _given
+
     def __post_init__(self) -> None:
         """Give a rod with a mass no rotary inertia but its own."""
         if self.rho_A is not _massless and self.rho_I is _unit_rotary:
@@ -117,7 +125,7 @@ class Inertia:
         return tuple(self.rho_I(c))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Drag:
     """Drag of a rod in a viscous fluid, in the place of its inertia: motions ``D x' = -K x``, not ``M x'' = -K x``.
 
@@ -132,6 +140,7 @@ class Drag:
     along: Given = role_field(Role("drag along the rod per length", "f(c)", 0, along=True))
     turning: Given = role_field(Role("drag of turning per length", "f(c)", 3, along=True), _no_rotary)
 
+    __repr__ = _given
     rho_A = property(lambda self: self.across)  # in the place of a mass, and of a rotary inertia
     rho_I = property(lambda self: self.turning)
 

@@ -39,7 +39,7 @@ ZERO = 1e-7  # a force or moment below this, relative to the natural force or mo
 OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
 """Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
 SMALL = 1e-3  # share of the greatest eigenvalue below which differences of eigenvalues are relative to this share
-BUDGET = 50_000  # stations of all states together above which each has fewer: about 6 MB of the page
+BUDGET = 40_000  # stations of all states together above which each has fewer: about 6 MB of the page
 
 
 def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, l
 
 
 def profiles_data(group: Any, states: int) -> dict[str, Any]:
-    """Profiles of a branch: ``profile`` (P, M, 13), arclength and the components of v, k, n and m along the directors.
+    """Profiles of a branch: ``profile`` (P, M, 17), arclength, components of v, k, n, m along the directors, and these.
 
     ``element`` (P,) says how many of the M points an element has, which determine its polynomials, and 0 where some are
     left out; ``jumps`` (P,) are those of each of the four between elements.
@@ -99,9 +99,10 @@ def profiles_data(group: Any, states: int) -> dict[str, Any]:
     most = group[POINTS][0].size
     acting = [float(place.attrs["s"]) for kind in (SUPPORTS, CONSTRAINTS) for place in group.get(kind, {}).values()]
     kept = np.unique(np.linspace(0, most - 1, min(most, max(2, BUDGET // states))).round().astype(int))
-    out = np.full((len(found), most, 1 + 3 * len(PROFILES)), np.nan)
-    for place, one in zip(out, found, strict=True):
+    out = np.full((len(found), most, 5 + 3 * len(PROFILES)), np.nan)
+    for row, (place, one) in enumerate(zip(out, found, strict=True)):
         columns = [one.points.reshape(-1, 1), *(one.fields[symbol].reshape(-1, 3) for symbol in PROFILES)]
+        columns.append(curve_at(group, row, one.points.ravel())[2])
         place[: one.points.size] = np.hstack(columns)
     element = [one.points.shape[1] * (len(kept) == most) for one in found]
     jumps = {symbol: plain([one.jump(symbol, acting) for one in found]) for symbol in PROFILES}

@@ -71,6 +71,7 @@ def test_what_a_cell_prints_is_short(diagram: Diagram) -> None:
 def test_help_has_what_a_person_calls() -> None:
     """A scene has its fields and a few methods, in help and in completion; all else serves the modules that compute."""
     page = pydoc.plain(pydoc.render_doc(Scene))
+    assert " at 0x" not in page and "inertia = Inertia()" in page
     assert "varying(self" in page and "ends" in page
     assert not any(f" |  {name}" in page for name in ("parts", "lagrangian", "known_force", "samples", "__eq__"))
     assert "varying" in dir(scene()) and "known_force" not in dir(scene())

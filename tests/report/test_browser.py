@@ -352,6 +352,10 @@ def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., 
     assert list(found) == ["curvature", "strain", "moment", "force"]
     assert "tension" in found["force"][1] and "torque" in found["moment"][1] and "twist" in found["curvature"][1]
     assert np.allclose(np.linalg.norm(found["force"][0], axis=0), load, rtol=1e-5) and (found["force"][0][2] < 0).any()
+    page.find_element(By.CSS_SELECTOR, "#profile-space input").click()  # the force, chosen last
+    along = np.array(page.execute_script("return document.getElementById('profile').data.map((t) => Array.from(t.y))"))
+    assert np.allclose(along, [[0.0], [0.0], [-load]], atol=1e-4 * load)
+    assert "n₃ along e₃" in page.find_element(By.ID, "profile-legend").text
     size = np.linalg.norm(found["moment"][0], axis=0)
     assert size[[0, -1]].max() < 1e-2 * size.max() and size.argmax() in range(len(size) // 3, 2 * len(size) // 3)
     assert np.allclose(found["strain"][0][2], 1.0)

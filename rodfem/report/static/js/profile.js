@@ -1,17 +1,18 @@
-// Strains, contact forces and moments along the rod, components along the directors, each by colour and dashes.
+// Strains, contact forces and moments along the rod, components along the directors or in space, by colour and dashes.
 
-import { data, entry, values } from "report/data";
+import { data, values } from "report/data";
 import { branch, state, subscribe } from "report/store";
 import { item, lineIcon } from "report/icons";
 import { draw, empty, layout } from "report/plotting";
 
 const plot = document.getElementById("profile"), legend = document.getElementById("profile-legend"), error = document.getElementById("profile-error");
-const SIZE = 13; // of a point: arclength, v, k, n, m
+const choice = document.getElementById("profile-space"), space = choice.querySelector("input");
+const SIZE = 17, FRAME = 13; // of a point: arclength, v, k, n, m, and from FRAME on the quaternion of its directors
 const TABS = {
   curvature: { symbol: "k", first: 4, names: ["bending about d₁", "bending about d₂", "twist"] },
   strain: { symbol: "v", first: 1, names: ["shear along d₁", "shear along d₂", "stretch"] },
-  moment: { symbol: "m", first: 10, names: ["bending about d₁", "bending about d₂", "torque"] },
-  force: { symbol: "n", first: 7, names: ["shear along d₁", "shear along d₂", "tension"] },
+  moment: { symbol: "m", first: 10, names: ["bending about d₁", "bending about d₂", "torque"], space: ["about e₁", "about e₂", "about e₃"] },
+  force: { symbol: "n", first: 7, names: ["shear along d₁", "shear along d₂", "tension"], space: ["along e₁", "along e₂", "along e₃"] },
 };
 const BELOW = ["₁", "₂", "₃"];
 const LINES = [
@@ -28,11 +29,33 @@ const FINE = 8; // points of a curve for each interval between two that an eleme
 let waiting = 0, last = 0;
 let tab = Object.keys(TABS)[0];
 
+// What the tab that is chosen shows: its names are those of components in space, if these are asked for and it has them.
+function shown() {
+  const found = TABS[tab], inSpace = Boolean(found.space && space.checked);
+  return { ...found, inSpace, names: inSpace ? found.space : found.names };
+}
+
+// Profiles of a branch with forces and moments by their components in space.
+function turned(b) {
+  if (!b.turned) {
+    const all = (b.turned = values(b.profile).slice());
+    for (let i = 0; i < all.length; i += SIZE) {
+      const [w, ...u] = all.subarray(i + FRAME, i + SIZE);
+      for (const { first } of Object.values(TABS).filter((one) => one.space)) {
+        const v = all.slice(i + first, i + first + 3), t = cross(u, v).map((x) => 2 * x), further = cross(u, t);
+        for (let k = 0; k < 3; k++) all[i + first + k] = v[k] + w * t[k] + further[k];
+      }
+    }
+  }
+  return b.turned;
+}
+
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
 // Range of a quantity over the whole branch, so that the axes stay while the state changes.
-function range(b, first, natural) {
-  const key = `range${first}`;
+function range(b, { first, inSpace }, natural, all) {
+  const key = `range${first}${inSpace}`;
   if (!b[key]) {
-    const all = values(b.profile);
     let [low, high] = [Infinity, -Infinity];
     for (let i = 0; i < all.length; i += SIZE)
       for (let k = first; k < first + 3; k++) if (!Number.isNaN(all[i + k])) [low, high] = [Math.min(low, all[i + k]), Math.max(high, all[i + k])];
@@ -62,12 +85,13 @@ function curves(all, size) {
 }
 
 function redraw() {
-  const b = branch(), { symbol, first, names } = TABS[tab];
+  const b = branch(), found = shown(), { symbol, first, names } = found;
   if (!b.profile) {
     error.textContent = "";
     return empty(plot, "The files of this run have no strains, forces and moments:\nrun the scene again.");
   }
-  const column = curves(entry(b.profile, state.row), b.element[state.row]), s = column(0);
+  const all = found.inSpace ? turned(b) : values(b.profile), size = b.profile.shape[1] * SIZE;
+  const column = curves(all.subarray(state.row * size, (state.row + 1) * size), b.element[state.row]), s = column(0);
   const traces = names.map((name, i) => ({
     x: s,
     y: column(first + i),
@@ -77,14 +101,15 @@ function redraw() {
     hovertemplate: `s = %{x:.4g}<br>${symbol}${BELOW[i]} = %{y:.5g}, ${name}<extra></extra>`,
   }));
   const how = layout("arclength s", `${tab} ${symbol}`, { margin: { l: 46, r: 10, t: 6, b: 34 }, uirevision: tab });
-  how.yaxis.range = range(b, first, NATURAL[symbol]);
-  const jump = b.jumps[symbol][state.row], size = Math.max(...how.yaxis.range.map(Math.abs));
-  error.textContent = jump > ROUND_OFF * size ? `error ≈ ${jump.toExponential(0)}` : "error: ~";
+  how.yaxis.range = range(b, found, NATURAL[symbol], all);
+  const jump = b.jumps[symbol][state.row], largest = Math.max(...how.yaxis.range.map(Math.abs));
+  error.textContent = jump > ROUND_OFF * largest ? `error ≈ ${jump.toExponential(0)}` : "error: ~";
   return draw(plot, traces, how);
 }
 
 function explain() {
-  const { symbol, names } = TABS[tab];
+  const { symbol, names, space: offered } = shown();
+  choice.hidden = !offered;
   legend.replaceChildren(...LINES.map((line, i) => item(lineIcon(line.color, line.width, line.dash), `${symbol}${BELOW[i]} ${names[i]}`)));
 }
 
@@ -117,5 +142,9 @@ export function start() {
   tabs.append(...buttons);
   mark();
   explain();
+  space.addEventListener("change", () => {
+    explain();
+    redraw();
+  });
   subscribe(soon);
 }
