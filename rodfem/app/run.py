@@ -169,13 +169,18 @@ class Terminal(Report):
         self._name()
 
     def _derive(self, diagram: Diagram) -> None:
-        """Find the derivative of the load of each special point in each constant that the equations depend on."""
+        """Find derivatives of critical loads, and of ordinates at given loads, in each constant that the rod depends on."""
         asked = asked_for(diagram.scene) - {diagram.scene.load, "s"}
         bar = self.plan.error_bars or self.plan.accuracy is not None
         for branch in diagram:
-            for special, name in product(_to_follow(branch), sorted(asked)):
+            states = [special for special in branch.special if special.kind == USER]
+            for special, name in product([*_to_follow(branch), *states], sorted(asked)):
                 with self._guard(diagram, branch, special):
-                    found = special.derivative(name, along_the_rod=special.kind.singular)
+                    found = (
+                        special.point.derivative(name)
+                        if special.kind == USER
+                        else special.derivative(name, along_the_rod=special.kind.singular)
+                    )
                     special.derivatives[name] = found.value, found.error if bar else nan
                     if found.acts_along(special.point.load):
                         special.densities[name] = found.ends, found.density

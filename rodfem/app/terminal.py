@@ -213,9 +213,15 @@ class Report(Observer):
 
     def derivatives(self, branches: Sequence[Branch], scene: Scene) -> None:
         """Print the derivatives of the loads of special points in the constants, if they were asked for."""
-        rows = [(b.name, s) for b in branches for s in b.special if s.derivatives]
+        found = [(b.name, s) for b in branches for s in b.special if s.derivatives]
+        critical, states = ([(name, s) for name, s in found if s.kind.request == asked] for asked in (False, True))
+        self._derivatives(f"critical {scene.load} changes (d{scene.load}/dNAME)", critical)
+        self._derivatives(f"{scene.ordinate.name} at a load changes (per NAME)", states)
+
+    def _derivatives(self, what: str, rows: Sequence[tuple[str, SpecialPoint]]) -> None:
+        """Print a table of derivatives of ``what``, if there are any."""
         if rows:
-            self.say(f"\nHow fast the critical {scene.load} changes (d{scene.load}/dNAME)")
+            self.say(f"\nHow fast the {what}")
         for name, special in rows:
             pairs = special.derivatives.items()  # what is less than its bar is zero
             values = "  ".join(f"{c}: {0 if abs(value) <= bar else number(value, bar)}" for c, (value, bar) in pairs)

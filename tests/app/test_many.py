@@ -168,4 +168,4 @@ def test_a_thousand_rods_in_a_minute(folder: Path) -> None:
     over, begun = {"A": np.linspace(-3.0, 0.0, 40), "C": np.linspace(0.8, 1.2, 25)}, process_time()
     found = family(hemitropic_cases.scene(), over, folder, Plan(depth=0, error_bars=False), comm=MPI.COMM_SELF)
     assert process_time() - begun < 60.0
-    assert_closed_form(found)
+    assert_closed_form(found.isel(A=slice(None, None, 3), C=slice(None, None, 4)))

@@ -163,7 +163,7 @@ def round_column() -> Scene:
     )
 
 
-def test_of_an_ordinate() -> None:
+def test_of_an_ordinate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An arc of the curvature M / B + K: its end is (1 - cos k) / k off the tangent, and a sum over it is k."""
     arc = Scene(
         name="arc",
@@ -185,6 +185,10 @@ def test_of_an_ordinate() -> None:
         assert abs(found.value - factor * slope) <= found.error < 1e-7
     with pytest.raises(InputError, match="choose one of B, K"):
         point.derivative("M")
+    asked = rodfem.run(arc, plan=Plan(at=(2.4,), sensitivity=True), output=tmp_path, figures=False)
+    value, error = asked.special("user")[0].derivatives["K"]
+    assert abs(abs(value) - abs(slope)) <= error < 1e-7
+    assert "How fast the deflection at a load changes" in capsys.readouterr().out
 
 
 def test_of_flutter_in_the_stiffness(tmp_path: Path) -> None:
@@ -194,6 +198,7 @@ def test_of_flutter_in_the_stiffness(tmp_path: Path) -> None:
     (flutter,) = diagram.special("flutter")
     value, error = flutter.derivatives["B1"]
     assert abs(value - flutter.point.load) <= error < 1e-6
+    assert flutter.derivatives["J1"][0] == pytest.approx(-214.79555, abs=1e-5)  # of rods with J1 = 0, 1e-5, 2e-5, 3e-5
     saved = json.loads((tmp_path / "diagram.json").read_text())
     assert [value, error] in [s["derivatives"]["B1"] for s in saved["branches"][0]["special"] if s["derivatives"]]
     assert rodfem.load(tmp_path, scene).special("flutter")[0].derivatives["B1"] == (value, error)
