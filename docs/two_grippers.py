@@ -24,7 +24,7 @@ from rodfem import Plan
 
 PAGE = Path(__file__).parent / "trades" / "two-grippers.md"
 CURVE = np.linspace(-0.55, 0.55, 12)
-"""Ratios C22 at which the C11 is sought at which the coefficient vanishes."""
+"""Ratios C22 at which the two C11 are sought at which the coefficient vanishes."""
 
 
 def program() -> SimpleNamespace:
@@ -64,12 +64,12 @@ def compared(page: SimpleNamespace, data: dict[str, np.ndarray]) -> dict[str, fl
     }
 
 
-def change_of_kind(page: SimpleNamespace, C22: float) -> float:
-    """Ratio C11 at which the coefficient vanishes: a mark of the locus of a path's branch point in kappa and C11."""
+def changes_of_kind(page: SimpleNamespace, C22: float) -> list[float]:
+    """Ratios C11 at which the coefficient vanishes: marks of the locus of a path's branch point in kappa and C11."""
     gentle = 0.38 + 0.3 * C22
     diagram = rodfem.trace(page.grippers(gentle, C22), plan=Plan(depth=0, error_bars=False))
-    locus = diagram.locus(diagram.special("branch point")[0], "C11", (gentle - 0.2, gentle + 0.35), load=(5.0, 8.5))
-    return next(float(locus.values[mark.row, 1]) for mark in locus.marks if mark.kind.startswith("pitchfork"))
+    locus = diagram.locus(diagram.special("branch point")[0], "C11", (0.02, gentle + 0.35), load=(4.0, 8.6))
+    return [float(locus.values[mark.row, 1]) for mark in locus.marks if mark.kind.startswith("pitchfork")]
 
 
 def main(folder: Path) -> None:
@@ -79,13 +79,14 @@ def main(folder: Path) -> None:
     axes = figure.subplots()
     for (kind, rows), mark in zip(data.items(), ("s", "o"), strict=True):
         axes.plot(rows[:, 0], rows[:, 1], mark, ms=4, label=f"experiment: {kind}")
-    curve = [change_of_kind(page, C22) for C22 in CURVE]
-    axes.plot(curve, CURVE, color="black", label="computed: the pitchfork's coefficient vanishes")
+    found = np.array([changes_of_kind(page, C22) for C22 in CURVE])
+    axes.plot(found, CURVE, color="black")
+    axes.plot([], [], color="black", label="computed: the pitchfork's coefficient vanishes")
     axes.set(xlabel=r"$C_{11} = \tau/\kappa$", ylabel=r"$C_{22} = \omega/\kappa$")
     axes.legend(frameon=False)
     figure.savefig(PAGE.with_suffix(".png"))
     print(*(f"{what}: {value:.3g}" for what, value in compared(page, data).items()), sep="\n")
-    print(*zip(np.round(curve, 4), CURVE.round(3), strict=True))
+    print(np.column_stack([CURVE, found]).round(4))
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ from rodfem.tolerances import TINY
 
 PITCHFORK = 1e-6
 """Derivative of an eigenvalue along its null vector, over the lowest bending one, of which a symmetry leaves less."""
-WIDE = 1e-2  # step of second differences, which lose more digits to round-off, in the metric
+WIDE = 4e-3  # step of second differences, which lose more digits to round-off, in the metric
 FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown."""
 SPLIT = 1.1
@@ -318,7 +318,9 @@ class SingularSystem:
 
     def _along_load(self, x: PETSc.Vec, t: float, w: PETSc.Vec, left: Vectors) -> tuple[list[PETSc.Vec], np.ndarray]:
         """``r`` of each of the ``left`` null vectors, and ``q``, by central differences along the response ``w``."""
-        h, r = DIFFERENCE / self.system.norm(w), [self.system.new_vector() for _ in left]
+        moved, one = w.copy(), 0.0 if self._section is None else 1.0  # in a section the natural size of the load
+        self.system.set_load(moved, self.system.scalar(w) - one)
+        h, r = DIFFERENCE / np.hypot(self.system.norm(moved), one), [self.system.new_vector() for _ in left]
         q = np.zeros((len(left), 1 if self._section is None else 2))
         for share in (0.5 / h, -0.5 / h) if left else ():
             there = x + w * float(np.copysign(h, share))
