@@ -169,7 +169,7 @@ class Terminal(Report):
         self._name()
 
     def _derive(self, diagram: Diagram) -> None:
-        """Find derivatives of critical loads, and of ordinates at given loads, in each constant that acts on the rod."""
+        """Find derivatives of critical loads, and of ordinates at given loads, in each constant that is in a form."""
         asked = asked_for(diagram.scene) - {diagram.scene.load, "s"}
         bar = self.plan.error_bars or self.plan.accuracy is not None
         for branch in diagram:
