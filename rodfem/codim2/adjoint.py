@@ -29,7 +29,9 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.singular import SHARP, SingularSystem
 from rodfem.errors import ConvergenceError
 from rodfem.fem.checks import Pieces
+from rodfem.fem.shape import Shape
 from rodfem.fem.state import line
+from rodfem.fem.system import System
 from rodfem.linalg.matrices import rounding
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.functions import derived
@@ -150,19 +152,15 @@ class Adjoint:
         parts = sum(
             weight / size * self._parts({parameter: known + place * size}, pieces) for place, weight in DIFFERENCES
         )
-        start, length = (shape.from_left(each)[:, None] for each in (shape.start, shape.size))
-        ends = np.append((start + length * np.arange(pieces) / pieces).ravel(), start[-1, 0] + length[-1, 0])
-        return ends, (-shape.from_left(np.transpose(parts)) / len(self.null) * pieces / length).ravel()
+        return _along(shape, np.asarray(-parts / len(self.null)), pieces)
 
     def _parts(self, constants: dict[str, float], number: int) -> np.ndarray:
         """Parts (pieces, cells) of the sum of ``v . S v + y . F``, at folds of ``v . F``, with other constants."""
-        scene, equations = self.system.scene, self.system.equations
-        pieces = derived(equations, Pieces, lambda: Pieces(equations))
-        equations.take(line(scene, {**self.values, **constants, scene.load: 0.0}, {scene.load: 1.0}))
+        scene, system = self.system.scene, self.system
+        system.equations.take(line(scene, {**self.values, **constants, scene.load: 0.0}, {scene.load: 1.0}))
 
         def product(state: PETSc.Vec, covector: PETSc.Vec) -> np.ndarray:
-            values, own = (v.local[pieces.dofs] for v in (self.system.at(state), self.system.change(covector)))
-            return np.einsum("pcn,cn->pc", pieces.vectors(equations.residual, values, number), own)
+            return _product(system, state, covector, number)
 
         if self.fold:
             return np.asarray(self.signs[0] * product(self.x, self.null[0]))
@@ -171,6 +169,21 @@ class Adjoint:
             h = 1.0 / self.system.norm(v)
             out += sum(sign * weight / h * product(self.x + v * (place * h), v) for place, weight in DIFFERENCES)
         return out
+
+
+def _product(system: System, state: PETSc.Vec, covector: PETSc.Vec, number: int) -> np.ndarray:
+    """Parts (pieces, cells) of the equations at a state times a covector, with the constants that were taken."""
+    equations = system.equations
+    pieces = derived(equations, Pieces, lambda: Pieces(equations))
+    values, own = (v.local[pieces.dofs] for v in (system.at(state), system.change(covector)))
+    return np.einsum("pcn,cn->pc", pieces.vectors(equations.residual, values, number), own)
+
+
+def _along(shape: Shape, parts: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Ends (m + 1,) of the pieces of the rod, and the means (m,) of which ``parts`` (number, cells) are integrals."""
+    start, length = (shape.from_left(each)[:, None] for each in (shape.start, shape.size))
+    ends = np.append((start + length * np.arange(number) / number).ravel(), start[-1, 0] + length[-1, 0])
+    return ends, (shape.from_left(np.transpose(parts)) * number / length).ravel()
 
 
 # --- of a state
@@ -192,3 +205,32 @@ def state_derivative(
             raise ConvergenceError(f"The state at {scene.load} = {load:.8g} is singular, and has no derivative.")
         parts = [weight / slope * of(there + tangent * place) for place, weight in DIFFERENCES]
     return np.asarray(sum(parts))
+
+
+def ordinate_density(solver: BranchSolver, x: PETSc.Vec, parameter: str, pieces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Ends (m + 1,) of pieces of the rod, and the density (m,) of the derivative of an ordinate at its load.
+
+    ``-a . F_p`` with ``S a = o``, the ordinate's own derivatives, by differences of the fourth order in each unknown.
+    """
+    system = solver.system
+    scene, gradient, a, there = system.scene, system.new_vector(), system.new_vector(), x.copy()
+    values = dict(zip(scene.parameters, system.line.origin.tolist(), strict=True))
+    for i in range(x.size):
+        unit = system.new_vector()
+        unit.setValue(i, 1.0)
+        unit.assemble()
+        slope = sum(weight * solver.shape.ordinate(there + unit * place) for place, weight in DIFFERENCES)
+        gradient.axpy(slope, unit)
+    system.set_load(gradient, 0.0)
+    system.set_phase(x)
+    system.at(x).factor(solver.axis)
+    if not system.solve(gradient, a):
+        raise ConvergenceError(
+            f"The state at {scene.load} = {system.scalar(x):.8g} is singular, and has no derivative."
+        )
+    size, parts = abs(values[parameter]) or 1.0, np.zeros(())
+    for place, weight in DIFFERENCES:
+        changed = {**values, parameter: values[parameter] + place * size, scene.load: 0.0}
+        system.equations.take(line(scene, changed, {scene.load: 1.0}))
+        parts = parts - weight / size * _product(system, x, a, pieces)
+    return _along(solver.shape, parts, pieces)

@@ -14,7 +14,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound
-from rodfem.codim2.adjoint import DIFFERENCES, Adjoint, state_derivative
+from rodfem.codim2.adjoint import DIFFERENCES, Adjoint, ordinate_density, state_derivative
 from rodfem.codim2.criteria import Plane, restoration
 from rodfem.codim2.follow import Curve, RicherMesh, check_special
 from rodfem.codim2.neighbours import Neighbours
@@ -250,24 +250,31 @@ def coefficient_derivative(special: SpecialPoint, parameter: str) -> Derivative:
 # --- of a state
 
 
-def ordinate_derivative(point: Point, parameter: str) -> Derivative:
+def ordinate_derivative(point: Point, parameter: str, *, along_the_rod: bool = False) -> Derivative:
     """How fast the ordinate of an equilibrium changes with a ``parameter``, at its load; collective.
 
-    Raises :class:`InputError` for what is no constant, and :class:`ConvergenceError` where the state is singular.
+    Raises :class:`InputError` for what is no constant, or has no density, and :class:`ConvergenceError` where the state
+    is singular.
     """
     solver = point.own_solver
     solver.system.scene.check_constant(parameter)
+    if along_the_rod and not solver.conservative:
+        raise InputError("A density of an ordinate along the rod is known under loads with a potential: leave it out.")
     value = _of_ordinate(solver, point.x, parameter)
+    along = ordinate_density(solver, point.x, parameter, PIECES) if along_the_rod else ()
 
     def bounds() -> tuple[float, float]:
-        richer = richer_mesh(solver)
+        richer, rho = richer_mesh(solver), halved(solver.system.fields.discretization.degree)
         x, outcome = richer.solver.at_load(richer.transfer(point.x, state=True), point.load)
         if not outcome.converged:
             return float("inf"), float("nan")
-        again, rho = _of_ordinate(richer.solver, x, parameter), halved(solver.system.fields.discretization.degree)
-        return bound(value, again, ROUNDED * abs(value), rho), float("nan")
+        error = bound(value, _of_ordinate(richer.solver, x, parameter), ROUNDED * abs(value), rho)
+        if not along:
+            return error, float("nan")
+        finer, first = ordinate_density(richer.solver, x, parameter, PIECES // 2)[1], along[1]
+        return error, bound(0.0, abs(finer - first).max(), ROUNDED * abs(first).max(), rho)
 
-    return Derivative(value, bounds)
+    return Derivative(value, bounds, np.zeros((0, 0)), *along)
 
 
 def _of_ordinate(solver: BranchSolver, x: PETSc.Vec, parameter: str) -> float:

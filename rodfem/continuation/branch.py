@@ -172,13 +172,14 @@ class Point:
         """
         return self.own_solver.reactions(self.x)
 
-    def derivative(self, parameter: str) -> Derivative:
+    def derivative(self, parameter: str, *, along_the_rod: bool = False) -> Derivative:
         """Derivative of the ordinate in a ``parameter`` at this load: ``.value`` and ``.error``; collective.
 
-        Raises :class:`~rodfem.errors.InputError` for what is no constant of the scene, and
-        :class:`~rodfem.errors.ConvergenceError` where the state is singular.
+        ``along_the_rod``, under loads with a potential, a ``.density``, of a parameter that varies.  Raises
+        :class:`~rodfem.errors.InputError` for what has none, and :class:`~rodfem.errors.ConvergenceError` where the
+        state is singular.
         """
-        return Point.sensitivity().ordinate_derivative(self, parameter)
+        return Point.sensitivity().ordinate_derivative(self, parameter, along_the_rod=along_the_rod)
 
     def backwards(self, total: float) -> Point:
         """The same equilibrium on the branch of length ``total`` followed the other way."""

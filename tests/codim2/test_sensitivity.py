@@ -185,6 +185,11 @@ def test_of_an_ordinate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         assert abs(found.value - factor * slope) <= found.error < 1e-7
     with pytest.raises(InputError, match="choose one of B, K"):
         point.derivative("M")
+    along = point.derivative("K", along_the_rod=True)
+    s, h = (along.ends[1:] + along.ends[:-1]) / 2, np.diff(along.ends)
+    lever = (np.sin(k) - np.sin(k * s) * np.sinc(k * h / (2 * np.pi))) / k  # mean distance along the tangent to the end
+    assert abs(abs(along.density) - lever).max() <= along.density_error < 1e-6
+    assert along.density @ h == pytest.approx(along.value, abs=1e-8)
     asked = rodfem.run(arc, plan=Plan(at=(2.4,), sensitivity=True), output=tmp_path, figures=False)
     value, error = asked.special("user")[0].derivatives["K"]
     assert abs(abs(value) - abs(slope)) <= error < 1e-7
