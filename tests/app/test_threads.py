@@ -4,18 +4,16 @@ from concurrent.futures import ThreadPoolExecutor
 from math import pi
 
 import pytest
+from classics import SUPPORTS, column
 
-from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free, trace
+from rodfem import Discretization, Plan, trace
 
 
 def first_load(stiffness: float) -> float:
     """Load of Euler's column of a bending stiffness, which is ``pi^2/4`` times it."""
-    column = Scene(
-        f"column of {stiffness}", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (stiffness * k[0] ** 2 + 2 * k[1] ** 2 + k[2] ** 2) / 2, {"P": 0.0}, "P",
-        (clamped(), free(lambda c: (0.0, 0.0, -c.P))), Ordinate("y", s=1.0, of=lambda r, q: r[1]), (0.0, 4.0),
-    )  # fmt: skip
-    (branch,) = trace(column, Discretization(elements=4, degree=4), Plan(depth=0))
+
+    rod = column("column", SUPPORTS["clamped-free"], (0.0, 4.0), constants={"B1": stiffness})
+    (branch,) = trace(rod, Discretization(elements=4, degree=4), Plan(depth=0))
     return branch.special[0].point.load
 
 

@@ -7,13 +7,12 @@ import golden_cases
 import hemitropic_cases
 import numpy as np
 import pytest
-from classics import ON_AXIS, RIGID, column, explore, push
+from classics import ON_AXIS, column, explore, push
 from closed_form_hemitropic import loads as buckling_loads
 
 from rodfem import (
     Discretization,
     Ordinate,
-    Parameter,
     Plan,
     Scene,
     StepControl,
@@ -26,7 +25,6 @@ from rodfem import (
 from rodfem.continuation.branch import breaks, merge_doubles
 from rodfem.continuation.follow import follow
 from rodfem.continuation.kinds import BRANCH_POINT
-from rodfem.forms.energy import bending_and_twist
 from rodfem.output.table import branch_data
 
 EULER = pi**2 / 4
@@ -35,11 +33,10 @@ EULER = pi**2 / 4
 
 def localised(turns: int = 27) -> Scene:
     """A rod twisted by many turns and pulled by T between clamps: van der Heijden & Thompson (2000), in other units."""
-    return Scene(
-        name="localised", interval=(0.0, 1.0), rod=RIGID, load="T", span=(3200.0, 2450.0),
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, c.C)),
-        parameters={"T": Parameter(3200.0), "C": Parameter(0.789 / 1.345)},
-        ends=(clamped(), sliding(ON_AXIS, (cos(turns * pi), 0.0, 0.0, sin(turns * pi)), lambda c: (0.0, 0.0, c.T))),
+    return column(
+        "localised",
+        (clamped(), sliding(ON_AXIS, (cos(turns * pi), 0.0, 0.0, sin(turns * pi)), lambda c: (0.0, 0.0, c.T))),
+        (3200.0, 2450.0), load="T", constants={"T": 3200.0, "B2": 1.0, "C": 0.789 / 1.345},
         start=lambda s: np.stack([np.cos(turns * pi * s), 0 * s, 0 * s, np.sin(turns * pi * s)], axis=1),
         ordinate=Ordinate("end shortening", s=1.0, of=lambda r, q: 1 - r[2]),
     )  # fmt: skip

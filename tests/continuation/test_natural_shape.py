@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
+from classics import column
 from demo_cases import scene
 
-from rodfem import Attachment, Discretization, Ordinate, Parameter, Scene, Solver, clamped, free, pinned, sliding, trace
+from rodfem import Attachment, Discretization, Ordinate, Scene, Solver, clamped, free, pinned, sliding, trace
 from rodfem.continuation.natural_shape import misfit, natural_shape
 
 HALF, LENGTH = 0.6, 1.0
@@ -18,18 +19,12 @@ RADIUS = LENGTH / (2 * HALF)
 def arch(ends: tuple[Any, Any], natural: Any = lambda c: 1 / RADIUS, **more: Any) -> Scene:
     """A strip of natural curvature about e2, as it is for a newcomer: pinned at its chord."""
     given: dict[str, Any] = {
-        "name": "arch",
-        "interval": (0.0, LENGTH),
-        "rod": "unshearable and inextensible",
         "energy": lambda v, k, c: 0.5 * (2 * k[0] ** 2 + (k[1] - natural(c)) ** 2 + 0.3 * k[2] ** 2),
-        "parameters": {"P": Parameter(0.0)},
-        "load": "P",
-        "ends": ends,
-        "ordinate": Ordinate("rise", s=LENGTH / 2, of=lambda r, q: r[0]),
         "span": (0.0, 5.0),
         "attachments": (Attachment(LENGTH / 2, force=lambda c: (c.P, 0.0, 0.0)),),
     }
-    return Scene(**given | more)
+    rise = Ordinate("rise", s=LENGTH / 2, of=lambda r, q: r[0])
+    return column("arch", ends, ordinate=rise, **given | more)
 
 
 @pytest.mark.parametrize("chord", [None, 2 * RADIUS * sin(HALF)])

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from classics import column, push
 
-from rodfem import Discretization, End, Ordinate, Plan, Scene, clamped, trace
-from rodfem.forms.energy import bending_and_twist
+from rodfem import Discretization, Ordinate, Plan, clamped, free, trace
 
 pytestmark = pytest.mark.ranks
 
@@ -47,10 +47,9 @@ def angle(r: Any, q: Any) -> float:
 def test_every_extremum_has_its_branch(form: tuple[float, ...], period: int) -> None:
     """Of ten random forms four lacked one or two branches, all of them maxima, without a word."""
     energy = lambda x, c: quartic(form, x.r[0], x.r[1])  # noqa: E731
-    rod = Scene(
-        "tip", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 0.8)),
-        {"P": 0.0}, "P", (clamped(), End(force=lambda c: (0.0, 0.0, -c.P), energy=energy)),
-        Ordinate("angle", s=1.0, of=angle), (0.0, 4.0),
+    rod = column(
+        "tip", (clamped(), free(push, energy=energy)), (0.0, 4.0), constants={"B2": 1.0, "C": 0.8},
+        ordinate=Ordinate("angle", s=1.0, of=angle),
     )  # fmt: skip
     found = trace(rod, Discretization(elements=4, degree=4), Plan(depth=1, error_bars=False))
     traced = sorted(branch.points[1].ordinate for branch in found.branches[1:])

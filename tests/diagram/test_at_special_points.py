@@ -7,12 +7,12 @@ the special point, whose eigenvalue at a fold is as large as the square root of 
 from functools import cache
 from pathlib import Path
 
+import classics
 import numpy as np
 import pytest
 from classics import pressed_ring
 
-from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, load, pinned, trace
-from rodfem.forms.energy import bending_and_twist
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, SpecialPoint, load, trace
 
 MESH = Discretization("auto", 4, 4)
 ROUND_OFF = 1e-8
@@ -25,19 +25,12 @@ def bedded(out_of_plane: float | None = None) -> Scene:
     It is in the plane, or in space, where its stiffness of bending ``out_of_plane`` is given, and that in it is 1.
     """
     planar = out_of_plane is None
-    return Scene(
-        "bedded column",
-        (0.0, 1.0),
-        "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (1.3 if planar else out_of_plane, 1.0, 1.0)),
-        {"P": 0.0},
-        "P",
-        (pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("m", s=0.5, of=lambda r, q: r[0]),
-        (0.0, 45.0 if planar else 20.5),
-        planar="e2" if planar else None,
+    return classics.column(
+        "bedded column", classics.SUPPORTS["pinned-pinned"], (0.0, 45.0 if planar else 20.5),
+        planar="e2" if planar else None, constants={"B1": 1.3 if planar else out_of_plane, "B2": 1.0},
+        ordinate=Ordinate("m", s=0.5, of=lambda r, q: r[0]),
         potential=lambda x, c: 100 * (x.r[0] ** 2 / 2 + x.r[0] ** 3 / 3) + 300 * x.r[1] ** 2,
-    )
+    )  # fmt: skip
 
 
 @cache

@@ -5,6 +5,7 @@ from math import inf, pi, sqrt
 from types import SimpleNamespace
 from typing import Any
 
+import classics
 import numpy as np
 import pytest
 from classics import column
@@ -14,7 +15,6 @@ import rodfem
 from rodfem import Discretization, End, Observer, Ordinate, Plan, Ring, Scene, StepControl, clamped, trace
 from rodfem.deflation.symmetries import Mirror
 from rodfem.diagram.special_search import PARTS, SHORTER, SpecialSearch, Unresolved
-from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_diagram import figure_of
 
 
@@ -24,18 +24,8 @@ def test_two_states_of_a_twisted_ring_are_joined_at_any_step() -> None:
 
     At the second one the branch meets states with one more free motion, along which Newton's method slides away.
     """
-    ring = Scene(
-        "ring",
-        (0.0, 2 * pi),
-        "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t0), (1.0, 1.0, 1.5)),
-        {"t0": 0.0},
-        "t0",
-        Ring(),
-        Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi)),
-        (0.0, 1.5),
-        start=lambda s: np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1),
-    )
+    twist = Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi))
+    ring = replace(classics.ring(), span=(0.0, 1.5), ends=Ring(), ordinate=twist)
     plan = Plan(depth=1, error_bars=False, steps=StepControl(largest=0.025))
     diagram = trace(ring, Discretization(elements=8, degree=6), plan)
     first, last = diagram["ring"].special[0], diagram["branch 1"].special[-1]

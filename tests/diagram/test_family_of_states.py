@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
-from classics import SUPPORTS, column
+from classics import SUPPORTS, column, push
 from closed_forms import elastica
 
-from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Ring, Scene, clamped, free, pinned, trace
+from rodfem import Diagram, Discretization, End, Inertia, Ordinate, Plan, Ring, clamped, free, pinned, trace
 
 
 def swept(turned: float, second: float) -> Diagram:
@@ -20,11 +20,9 @@ def swept(turned: float, second: float) -> Diagram:
     The ``second`` one is that along e2.
     """
     half = np.array([cos(turned / 2), 0.0, 0.0, sin(turned / 2)])
-    rod = Scene(
-        "strip", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (k[0] ** 2 + 2 * k[1] ** 2 + k[2] ** 2) / 2, {"P": 0.0}, "P",
-        (pinned(), free(follower=lambda c: (0.0, 0.0, -c.P))), Ordinate("x", s=0.5, of=lambda r, q: r[0]),
-        (0.0, 30.0), potential=lambda x, c: (60 * x.r[0] ** 2 + second * x.r[1] ** 2) / 2,
+    rod = column(
+        "strip", (pinned(), free(follower=push)), (0.0, 30.0), ordinate=Ordinate("x", s=0.5, of=lambda r, q: r[0]),
+        potential=lambda x, c: (60 * x.r[0] ** 2 + second * x.r[1] ** 2) / 2,
         inertia=Inertia(lambda c: 1.0, lambda c: [1e-3] * 3), start=lambda s: half + 0 * np.asarray(s)[:, None],
     )  # fmt: skip
     return trace(rod, Discretization(elements=4, degree=5), Plan(depth=0, error_bars=False))
@@ -60,7 +58,7 @@ def slender(mass: Callable[[Any], Any]) -> Inertia:
 @pytest.mark.long
 def test_a_sweep_ends_before_a_negative_mass() -> None:
     """It is from 0.39 to 0.41, and a row of the sweep is there."""
-    ends = clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))
+    ends = clamped(), free(follower=push)
     (branch,) = trace(column("sweep", ends, (0.0, 5.0), inertia=slender(dented(0.4, 0.01))), MESH, Plan())
     assert re.search(r"A mass or rotary inertia of -1 at P = 0\.4 is negative: give zero or more", branch.ended)
     assert branch.points[-1].load == pytest.approx(0.35)
@@ -102,10 +100,9 @@ def test_helices_of_one_turn_of_a_family_at_each_load() -> None:
     def place(c: Any) -> tuple[Any, ...]:
         return 0.0, ufl.sqrt(4 * pi**2 - c.t**2) * c.t / (4 * pi**2), c.t**2 / (4 * pi**2)
 
-    helix = Scene(
-        "helix", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + 3 * k[2] ** 2) / 2, {"t": 1.0}, "t",
-        (clamped(), clamped(place, (-1.0, 0.0, 0.0, 0.0))), Ordinate("x", s=0.5, of=lambda r, q: r[0]), (1.0, 5.0),
+    helix = column(
+        "helix", (clamped(), clamped(place, (-1.0, 0.0, 0.0, 0.0))), (1.0, 5.0), load="t",
+        constants={"t": 1.0, "B2": 1.0, "C": 3.0}, ordinate=Ordinate("x", s=0.5, of=lambda r, q: r[0]),
         start=lambda s: wound(s, 1.0),
     )  # fmt: skip
     found = trace(helix, Discretization(elements=8), depth=0)
@@ -118,16 +115,15 @@ def test_helices_of_one_turn_of_a_family_at_each_load() -> None:
 
 
 def half_turn(ends: Any) -> Diagram:
-    """A strip of ``B2 = a B1``, ``C = 0.8 B1``, closed with half a turn."""
+    """A strip of ``C = 0.8 B1``, closed with half a turn."""
 
     def start(s: np.ndarray) -> np.ndarray:
         a, b = np.pi * np.asarray(s), np.pi * np.asarray(s) / 2
         return np.stack([np.cos(a) * np.cos(b), np.sin(a) * np.sin(b), np.sin(a) * np.cos(b), np.cos(a) * np.sin(b)], 1)
 
-    strip = Scene(
-        "strip", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (k[0] ** 2 + c.a * k[1] ** 2 + 0.8 * k[2] ** 2) / 2, {"a": 1.5}, "a", ends,
-        Ordinate("energy", s=None, of=lambda x, c: x.k[0] ** 2), (1.5, 6.0), start=start,
+    strip = column(
+        "strip", ends, (1.5, 6.0), load="B2", constants={"B2": 1.5, "C": 0.8}, start=start,
+        ordinate=Ordinate("energy", s=None, of=lambda x, c: x.k[0] ** 2),
     )  # fmt: skip
     found = trace(strip, Discretization(elements=16), depth=0, at=(2.0,), error_bars=False)
     assert found[0].ended == "end of range"
@@ -156,12 +152,11 @@ def test_a_ring_with_half_a_turn_slides_along_itself() -> None:
 def test_one_branch_of_a_circle_of_states_that_no_symmetry_explains() -> None:
     """A rod that bends alike in all directions while it does not twist: guided, it buckles at ``4 pi^2`` in any."""
     guided = End(position=(0.0, 0.0, None), rotation=(1.0, 0.0, 0.0, 0.0), force=lambda c: (0.0, 0.0, -c.P))
-    column = Scene(
-        "guided", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) / 2 - 0.05 * k[1] ** 2 * k[2] ** 2, {"P": 0.0}, "P",
-        (clamped(), guided), Ordinate("middle", s=0.5, of=lambda r, q: r[0]), (35.0, 45.0),
+    rod = column(
+        "guided", (clamped(), guided), (35.0, 45.0), ordinate=Ordinate("middle", s=0.5, of=lambda r, q: r[0]),
+        energy=lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) / 2 - 0.05 * k[1] ** 2 * k[2] ** 2,
     )  # fmt: skip
-    found = trace(column, Discretization(elements=6, degree=4), depth=1, error_bars=False)
+    found = trace(rod, Discretization(elements=6, degree=4), depth=1, error_bars=False)
     (special,) = found.special("branch point")
     assert special.point.load == pytest.approx(4 * pi**2, rel=1e-7)
     assert [branch.name for branch in found] == ["straight", "branch 1"]
@@ -170,12 +165,7 @@ def test_one_branch_of_a_circle_of_states_that_no_symmetry_explains() -> None:
 
 def test_a_round_cantilever_is_followed_from_its_circle() -> None:
     """The straight rod's border has both modes of the circle, one of which a phase condition keeps on the branch."""
-    rod = Scene(
-        "round", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + k[2] ** 2) / 2, {"P": 0.0}, "P",
-        (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("tip", s=1.0, of=lambda r, q: np.hypot(r[0], r[1])), (0.0, 4.0),
-    )  # fmt: skip
+    rod = column("round", SUPPORTS["clamped-free"], (0.0, 4.0), constants={"B2": 1.0})
     branch = trace(rod, depth=1)["branch 1"]
     assert branch.ended == "end of range"
     assert abs(branch.points[-1].ordinate - elastica(4.0)[1]) <= branch.special[-1].ordinate_error

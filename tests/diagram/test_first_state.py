@@ -10,10 +10,11 @@ import classics
 import demo_cases
 import numpy as np
 import pytest
-import ufl
 from classics import circle
+from fem.test_reactions import cable
+from hard.published import radial
 
-from rodfem import Branch, Discretization, InputError, Ordinate, Plan, Ring, Scene, Solver, clamped, free, pinned, trace
+from rodfem import Branch, Discretization, InputError, Ordinate, Plan, Ring, Scene, Solver, pinned, trace
 from rodfem.diagram.explorer import Explorer
 from rodfem.forms.energy import bending_and_twist
 
@@ -66,10 +67,9 @@ def test_of_two_equilibria_the_one_beside_the_start() -> None:
     def stiff(v: Any, k: Any, c: Any) -> Any:
         return (1 - 0.15 * c.s) * (1.335 * (k[0] ** 2 + k[1] ** 2) + 1.1 * k[2] ** 2 + 20 * (v[2] - 1) ** 2)
 
-    ring = Scene(
-        "tapered ring", (0.0, 2 * np.pi), "unshearable", stiff, {"P": 0.2}, "P", Ring(),
-        Ordinate("bending", None, of=lambda x, c: x.k[0] ** 2 + x.k[1] ** 2), (0.2, 5.0), planar="e2", start=circle,
-        distributed=lambda c: (c.P * ufl.cos(c.s), 0.0, -c.P * ufl.sin(c.s)),
+    ring = classics.column(
+        "tapered ring", Ring(), (0.2, 5.0), interval=(0.0, 2 * pi), rod="unshearable", energy=stiff, planar="e2",
+        ordinate=Ordinate("bending", None, of=lambda x, c: x.k[0] ** 2 + x.k[1] ** 2), start=circle, distributed=radial,
     )  # fmt: skip
     found = [Solver(ring, Discretization("auto", elements, 5)).equilibrium(0.2) for elements in (7, 8, 10, 14)]
     assert [point.negative for point in found] == [1] * 4
@@ -98,27 +98,22 @@ def test_a_column_buckles_in_any_units(stiffness: float, push: float) -> None:
     assert found.warnings == []
 
 
-@pytest.mark.parametrize("run", [lambda cable: Solver(cable).equilibrium(280.0), trace, partial(trace, accuracy=1e-6)])
+@pytest.mark.parametrize("run", [lambda rod: Solver(rod).equilibrium(280.0), trace, partial(trace, accuracy=1e-6)])
 def test_a_first_state_of_more_half_waves_than_a_mesh_holds(run: Callable[[Scene], Any]) -> None:
     """A slack cable as a straight rod in compression, two per cent too long: its index grows with the mesh."""
-    cable = Scene(
-        "cable", (0.0, 300.0), "unshearable",
-        lambda v, k, c: 1.5e8 * (v[2] - 1) ** 2 + bending_and_twist(k, (1e4, 1e4, 1e4)), {"x": 280.0}, "x",
-        (clamped(), pinned(lambda c: (90.0, 0.0, c.x))), Ordinate("height", s=150.0, of=lambda r, q: r[0]),
-        (280.0, 170.0), planar="e2", distributed=lambda c: (-250.0, 0.0, 0.0),
+    rod = replace(
+        cable(), parameters={"x": 280.0}, span=(280.0, 170.0),
         start=lambda s: np.stack([np.cos(0.1555) + 0 * s, 0 * s, np.sin(0.1555) + 0 * s, 0 * s], axis=1),
     )  # fmt: skip
     with pytest.raises(InputError, match=r"more half-waves .* or a start nearer to the equilibrium"):
-        run(cable)
+        run(rod)
 
 
 def test_a_first_index_of_the_mesh_that_a_run_goes_on_with() -> None:
     """A cantilever buckles at ``(2 k - 1)^2 pi^2 / 4``, 55 times below 30,000; four elements hold half of that."""
-    scene = Scene(
-        "column", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-        {"P": 0.0}, "P", (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (30000.0, 30010.0), planar="e2",
-    )  # fmt: skip
+    scene = classics.column(
+        "column", classics.SUPPORTS["clamped-free"], (30000.0, 30010.0), planar="e2", constants={"B2": 1.0}
+    )
     found = trace(scene, accuracy=1e-6, depth=0)
     assert {point.negative for point in found[0].points} == {55}
     assert found.notes == ["the first state is unstable already (index 55): stability was lost outside the range"]

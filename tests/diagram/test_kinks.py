@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
-from classics import column
+from classics import column, push
 from mpi4py import MPI
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from rodfem import Diagram, Discretization, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free, load, trace
+from rodfem import Diagram, Discretization, Inertia, Ordinate, Plan, clamped, free, load, trace
 from rodfem.app.terminal import Report
-from rodfem.forms.energy import bending_and_twist
 from rodfem.output.pieces import pieces_of, typical_state
 from rodfem.output.words import words_of
 
@@ -23,10 +22,9 @@ from rodfem.output.words import words_of
 def one_sided(where: Any = ufl.ge) -> Diagram:
     """A column with a spring at its tip, on one side."""
     spring = lambda x, c: ufl.conditional(where(x.r[0], 0.0), 20 * x.r[0] ** 2, 0.0)  # noqa: E731
-    rod = Scene(
-        "one-sided", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (20.0, 2.0, 1.0)),
-        {"P": 0.0}, "P", (clamped(), free(lambda c: (0.0, 0.0, -c.P), energy=spring)),
-        Ordinate("x", s=1.0, of=lambda r, q: r[0]), (0.0, 15.0),
+    rod = column(
+        "one-sided", (clamped(), free(push, energy=spring)), (0.0, 15.0), constants={"B1": 20.0},
+        ordinate=Ordinate("x", s=1.0, of=lambda r, q: r[0]),
     )  # fmt: skip
     return trace(rod, Discretization(elements=3, degree=4), Plan(depth=0, at=(6.0,)))
 
@@ -84,10 +82,10 @@ LOADS = (1.2, 1.5, 2.0, 3.0)
 
 def bent(energy: Any, mesh: tuple[int, int], at: tuple[float, ...] = LOADS) -> Diagram:
     """A cantilever under a force across, of bending energy ``energy(k)`` about one axis."""
-    rod = Scene(
-        "bent", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: energy(k[0]) + 5 * k[1] ** 2 + k[2] ** 2,
-        {"P": 0.0}, "P", (clamped(), free(lambda c: (0.0, -c.P, 0.0))), Ordinate("y", s=1.0, of=lambda r, q: r[1]),
-        (0.0, 3.5),
+    rod = column(
+        "bent", (clamped(), free(lambda c: (0.0, -c.P, 0.0))), (0.0, 3.5),
+        energy=lambda v, k, c: energy(k[0]) + 5 * k[1] ** 2 + k[2] ** 2,
+        ordinate=Ordinate("y", s=1.0, of=lambda r, q: r[1]),
     )  # fmt: skip
     return trace(rod, Discretization("auto", *mesh), Plan(depth=0, at=at))
 
@@ -122,11 +120,10 @@ def lateral(threshold: float) -> Diagram:
         a = abs(k)
         return ufl.conditional(ufl.lt(a, threshold), 5 * k**2, 2 * k**2 + 6 * threshold * a - 3 * threshold**2)
 
-    rod = Scene(
-        "strip", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: soft(k[0]) + 0.5 * k[1] ** 2 + 0.5 * c.C * k[2] ** 2,
-        {"P": 0.0, "C": Parameter(1.0)}, "P", (clamped(), free(lambda c: (0.0, -c.P, 0.0))),
-        Ordinate("x", s=1.0, of=lambda r, q: r[0]), (0.0, 6.0),
+    rod = column(
+        "strip", (clamped(), free(lambda c: (0.0, -c.P, 0.0))), (0.0, 6.0),
+        energy=lambda v, k, c: soft(k[0]) + 0.5 * k[1] ** 2 + 0.5 * c.C * k[2] ** 2,
+        ordinate=Ordinate("x", s=1.0, of=lambda r, q: r[0]),
     )  # fmt: skip
     return trace(rod, Discretization(elements=4, degree=4), Plan(depth=0))
 

@@ -6,7 +6,7 @@ critical: the statics of a cantilever under a follower load is regular at every 
 """
 
 from dataclasses import replace
-from math import cos, hypot, pi, sin, sqrt
+from math import cos, pi, sin, sqrt
 from typing import Any
 
 import classics
@@ -24,7 +24,6 @@ from rodfem import (
     End,
     Inertia,
     Ordinate,
-    Parameter,
     Plan,
     Scene,
     clamped,
@@ -40,14 +39,10 @@ POLE = 20.190728556
 
 
 def light(mass: float, span: tuple[float, float]) -> Scene:
-    return Scene(
-        name="light", interval=(0.0, 1.0), rod="unshearable and inextensible", planar="e1",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 3.0, 1.0)),
-        parameters={"P": Parameter(0.0), "rho": Parameter(mass)}, load="P", span=span,
-        ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))),
+    return column(
+        "light", (clamped(), free(follower=classics.push)), span, planar="e1", constants={"B2": 3.0, "rho": mass},
         inertia=Inertia(rho_A=lambda c: c.rho, rho_I=lambda c: (0.0, 0.0, 0.0)),
         attachments=(Attachment(1.0, mass=lambda c: 1.0),),
-        ordinate=Ordinate("deflection of the tip", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
     )  # fmt: skip
 
 
@@ -111,11 +106,10 @@ def test_a_torsion_without_inertia_that_passes_through_infinity() -> None:
 
         return float(solve_ivp(rates, (0, 1), [0, 1, 1, 0, 0, 0], rtol=1e-11, atol=1e-12).y[2, -1])
 
-    arch = Scene(
-        "arch", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (1.0, 1.0, 0.1)), {"P": 0.0}, "P",
-        (clamped(), free()), Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (-10.0, -12.0),
-        follower=lambda c: (c.P, 0.0, 0.0), inertia=Inertia(rho_A=lambda c: 1.0),
+    arch = column(
+        "arch", (clamped(), free()), (-10.0, -12.0), follower=lambda c: (c.P, 0.0, 0.0),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (1.0, 1.0, 0.1)),
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]), inertia=Inertia(rho_A=lambda c: 1.0),
     )  # fmt: skip
     (branch,) = diagram = trace(arch, Discretization(elements=6), Plan(depth=0, error_bars=False))
     assert {p.negative for p in branch.points} == {2} and not branch.unexplained  # as with a little rotary inertia

@@ -6,6 +6,7 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
+import classics
 import numpy as np
 import pytest
 import ufl
@@ -15,7 +16,7 @@ from mpi4py import MPI
 from numpy.polynomial import legendre
 from petsc4py import PETSc
 
-from rodfem import Discretization, Ordinate, Parameter, Plan, Scene, SetupError, Solver, clamped, compat, free, trace
+from rodfem import Discretization, Plan, Scene, SetupError, Solver, clamped, compat, free, trace
 from rodfem.fem import form_compiler
 from rodfem.fem.known import readable
 from rodfem.fem.shape import Shape
@@ -164,11 +165,9 @@ def test_least_stretch_is_that_of_all_elements() -> None:
 
 def column(stiffness: float, weight: float) -> Scene:
     """Euler's column of that bending stiffness, whose dead load is ``weight`` times the parameter."""
-    return Scene(
-        "column", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: 0.5 * stiffness * (k[0] ** 2 + 2.6 * k[1] ** 2 + k[2] ** 2), {"P": 0.0}, "P",
-        (clamped(), free(lambda c: (0.0, 0.0, -weight * c.P))), Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        (0.0, 1.2 * stiffness / weight * pi**2 / 4),
+    return classics.column(
+        "column", (clamped(), free(lambda c: (0.0, 0.0, -weight * c.P))), (0.0, 1.2 * stiffness / weight * pi**2 / 4),
+        energy=lambda v, k, c: 0.5 * stiffness * (k[0] ** 2 + 2.6 * k[1] ** 2 + k[2] ** 2),
     )  # fmt: skip
 
 
@@ -214,10 +213,8 @@ def linear(v: Any, k: Any, c: Any) -> Any:
 
 
 def rod(energy: Any) -> Scene:
-    return Scene(
-        "rod", (0.0, 1.0), "unshearable and inextensible", energy, {"p": Parameter(0.0), "n": Parameter(0.3)}, "p",
-        (clamped(), free(lambda c: (c.p, 0.0, 0.0))), Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (0.0, 12.0),
-    )  # fmt: skip
+    ends = clamped(), free(lambda c: (c.P, 0.0, 0.0))
+    return classics.column("rod", ends, (0.0, 12.0), energy=energy, constants={"n": 0.3})
 
 
 @pytest.mark.long

@@ -9,6 +9,7 @@ import classics
 import numpy as np
 import pytest
 import ufl
+from hard.published import radial
 
 from rodfem import Discretization, Ring, Scene, Solver
 from rodfem.continuation.branch_solver import BranchSolver
@@ -16,11 +17,6 @@ from rodfem.fem.newton import relax
 from rodfem.fem.system import System
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.assessment import Assessor
-
-
-def radial(c: Any) -> tuple[Any, ...]:
-    """A load p towards the centre of the undeformed circle, which keeps its direction."""
-    return (c.P * ufl.cos(c.s), 0.0, -c.P * ufl.sin(c.s))
 
 
 def ring(planar: str | None = None, B2: float = 1.0, C: float = 1.0, load: Any = radial, **more: Any) -> Scene:

@@ -1,19 +1,18 @@
 """A state owns its numbers: no other state, load or parameter that is evaluated meanwhile changes them."""
 
 import ast
-from dataclasses import replace
 from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from classics import column
 from small_states import plain
 
-from rodfem import Discretization, Ordinate, Parameter, Scene, clamped
+from rodfem import Discretization, Ordinate, clamped
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.fem.state import State, line
 from rodfem.fem.system import System
-from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -69,19 +68,17 @@ def test_the_state_of_last_time_serves_the_same_values_and_line_alone() -> None:
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
 def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> None:
     """Also where the ends are: the ordinate is measured from them."""
-    rod = Scene(
-        "moved", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, c.B, 1.0)),
-        {"d": 0.1, "e": 0.0, "B": 2.0}, "d",
-        (clamped(lambda c: (c.e, 0.0, 0.0)), clamped(lambda c: (c.e, 0.0, 1.0 - c.d))),
-        Ordinate("place of the middle", s=0.5, of=lambda r, q: r[0]), (0.05, 0.5),
+    rod = column(
+        "moved", (clamped(lambda c: (c.e, 0.0, 0.0)), clamped(lambda c: (c.e, 0.0, 1.0 - c.d))), (0.05, 0.5), load="d",
+        constants={"d": 0.1, "e": 0.0}, ordinate=Ordinate("place of the middle", s=0.5, of=lambda r, q: r[0]),
         start=lambda s: np.stack([np.cos(np.sin(pi * s)), 0 * s, np.sin(np.sin(pi * s)), 0 * s], axis=1),
     )  # fmt: skip
-    moved = replace(rod, parameters={"d": Parameter(0.1), "e": Parameter(0.7), "B": Parameter(3.0)})
+    moved = rod.varying("d", rod.span, e=0.7, B2=3.0)
     discretization = Discretization(formulation, 4, 3)
     given, expected = (BranchSolver(System(scene, discretization)) for scene in (rod, moved))
     x = expected.start(0.2)
     assert abs(given.shape.ordinate(x) - expected.shape.ordinate(x)) > 0.5
-    given.system.line = line(rod, {"d": 0.15, "e": 0.7, "B": 3.0}, {"d": 0.25})
+    given.system.line = line(rod, {"d": 0.15, "e": 0.7, "B2": 3.0}, {"d": 0.25})
     y = x.copy()
     given.system.set_load(y, 0.2)  # d = 0.15 + 0.25 * 0.2 = 0.2
     assert given.shape.ordinate(y) == pytest.approx(expected.shape.ordinate(x), abs=1e-14)

@@ -7,6 +7,7 @@ import classics
 import numpy as np
 import pytest
 import ufl
+from classics import push
 from demo_cases import scene
 from hard.published import pressed
 from hemitropic_cases import DEFAULT
@@ -17,7 +18,6 @@ from rodfem import (
     End,
     Inertia,
     Ordinate,
-    Parameter,
     Plan,
     Ring,
     Scene,
@@ -38,10 +38,6 @@ from rodfem.problem.functions import Constants
 from rodfem.writhe import lies_on_itself
 
 MIDDLE = Ordinate("displacement of the middle", s=0.5, of=lambda r, q: hypot(r[0], r[1]))
-
-
-def push(c: Constants) -> tuple:
-    return (0.0, 0.0, -c.P)
 
 
 def sheared(v: ufl.core.expr.Expr, stiffness: float) -> ufl.core.expr.Expr:
@@ -170,11 +166,9 @@ def test_a_circle_covered_twice_has_no_linking_number(thick: float) -> None:
 @pytest.mark.parametrize("twisting", [pytest.param(1.0, marks=pytest.mark.alone), 1e7])
 def test_bending_alike_is_told_beside_a_stiff_twist(second: float, number: int, twisting: float) -> None:
     """Beside 1e7 a difference of 0.2 was round-off: a bending mode, and the flutter load, were lost to a symmetry."""
-    rod = Scene(
-        "stiff", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (1.0, second, twisting)), {"M": Parameter(0.0)}, "M",
-        (clamped(), free(follower_moment=lambda c: (0.0, 0.0, c.M))), MIDDLE, (0.0, 1.0),
-        inertia=Inertia(lambda c: 1.0),
+    rod = classics.column(
+        "stiff", (clamped(), free(follower_moment=lambda c: (0.0, 0.0, c.P))), (0.0, 1.0),
+        constants={"B2": second, "C": twisting}, inertia=Inertia(lambda c: 1.0),
     )  # fmt: skip
     assert len(System(rod, Discretization("pointwise", 4, 6)).symmetries) == number
 
@@ -187,10 +181,9 @@ def hinge(bending: float, spring: float) -> Scene:
 
     Whatever its stiffness the mode is a rigid rotation.
     """
-    return Scene(
-        "hinge", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending * ufl.dot(k, k) / 2, {"P": 0.0},
-        "P", (hinged((0.0, 1.0, 0.0)), End(force=lambda c: (0.0, 0.0, -c.P), energy=lambda x, c: spring * x.r[0] ** 2)),
-        Ordinate("x", s=1.0, of=lambda r, q: r[0]), (0.0, 4.0), planar="e2",
+    return classics.column(
+        "hinge", (hinged((0.0, 1.0, 0.0)), free(push, energy=lambda x, c: spring * x.r[0] ** 2)), (0.0, 4.0),
+        planar="e2", energy=lambda v, k, c: bending * ufl.dot(k, k) / 2,
     )  # fmt: skip
 
 
@@ -207,10 +200,9 @@ def test_a_rotation_against_a_spring_is_no_symmetry(bending: float) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("bending", [1.0, 1e9])
 def test_a_rotation_that_springs_allow_is_one(bending: float) -> None:
-    rod = Scene(
-        "post", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending * ufl.dot(k, k) / 2, {"P": 0.0},
-        "P", (pinned(), End(force=lambda c: (0.0, 0.0, -c.P), energy=lambda x, c: x.r[0] ** 2 + x.r[1] ** 2)),
-        Ordinate("x", s=1.0, of=lambda r, q: r[0]), (0.0, 4.0),
+    rod = classics.column(
+        "post", (pinned(), free(push, energy=lambda x, c: x.r[0] ** 2 + x.r[1] ** 2)), (0.0, 4.0),
+        energy=lambda v, k, c: bending * ufl.dot(k, k) / 2,
     )  # fmt: skip
     system = Solver(rod, Discretization(elements=3, degree=4)).equilibria.system
     assert "rotation about e3" in " ".join(map(str, system.symmetries))
@@ -235,11 +227,9 @@ def test_an_eigenvalue_near_zero_is_no_rotation() -> None:
 
     Its turning about itself is the one that is zero.
     """
-    rod = Scene(
-        "nearly straight", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (k[0] ** 2 + (k[1] - CURVATURE) ** 2 + 1e4 * k[2] ** 2) / 2, {"P": 0.0}, "P",
-        (pinned(), pinned(lambda c: (0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("x", s=0.5, of=lambda r, q: r[0]), (9.8, 9.87),
+    rod = classics.column(
+        "nearly straight", (pinned(), SLIDING), (9.8, 9.87), ordinate=MIDDLE,
+        energy=lambda v, k, c: (k[0] ** 2 + (k[1] - CURVATURE) ** 2 + 1e4 * k[2] ** 2) / 2,
     )  # fmt: skip
     (branch,) = trace(rod, Discretization(elements=6, degree=4), Plan(depth=0))
     rows = [point for point in branch.points if 1 - point.load / pi**2 > LEAST]
@@ -254,11 +244,9 @@ def test_a_pendulum_beside_a_stiff_twist_falls() -> None:
 
     Beside a twist 1e4 times as stiff as bending a force of 1e-5 is no round-off.
     """
-    rod = Scene(
-        "pendulum", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (k[0] ** 2 + k[1] ** 2 + 1e4 * k[2] ** 2) / 2, {"w": 0.0}, "w",
-        (pinned(), free(lambda c: (0.0, 0.0, c.w))), Ordinate("x", s=1.0, of=lambda r, q: r[0]), (1e-4, -1e-4),
-    )  # fmt: skip
+    rod = classics.column(
+        "pendulum", (pinned(), free(lambda c: (0.0, 0.0, c.P))), (1e-4, -1e-4), constants={"B2": 1.0, "C": 1e4}
+    )
     (branch,) = trace(rod, Discretization(elements=4, degree=4), Plan(depth=0, error_bars=False))
     fallen = [point for point in branch.points if point.load < -1e-5]
     assert len(fallen) > 3

@@ -1,10 +1,11 @@
 """Rods that nothing holds: rigid motions are their symmetries, and a thrust makes them flutter."""
 
 from dataclasses import replace
-from math import hypot, pi
+from math import pi
 
 import numpy as np
 import pytest
+from classics import BEAM, ROUND, circle, column, push
 from numpy.polynomial import Legendre
 from scipy.interpolate import CubicSpline
 from scipy.linalg import eigvals
@@ -16,8 +17,6 @@ from rodfem import (
     Discretization,
     End,
     Inertia,
-    Ordinate,
-    Parameter,
     Plan,
     Ring,
     Scene,
@@ -37,22 +36,15 @@ MESH = Discretization("pointwise", 6, 6)
 
 
 def floating(ends: tuple, span: tuple[float, float], **loads) -> Scene:
-    return Scene(
-        name="floating",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-        parameters={"P": Parameter(0.0)},
-        load="P",
-        ends=ends,
-        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),
-        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: hypot(r[0], r[1])),
-        span=span,
-        **loads,
-    )
+    return column("floating", ends, span, constants={"B2": 1.0}, inertia=BEAM, **loads)
 
 
-PRESSED = (free(lambda c: (0.0, 0.0, c.P)), free(lambda c: (0.0, 0.0, -c.P)))
+def thrust(span: tuple[float, float]) -> Scene:
+    """A thrust along the end, which the inertia of the rod balances."""
+    return floating((free(), free(follower=push)), span, distributed=lambda c: (0.0, 0.0, c.P))
+
+
+PRESSED = (free(lambda c: (0.0, 0.0, c.P)), free(push))
 
 
 @pytest.mark.long
@@ -105,9 +97,8 @@ def test_thrust_of_a_rod_that_bends_unlike_in_its_planes(rotary: float) -> None:
     forces of drifts that are generic the equations are singular.  With rotary inertia the frequencies are lower, and
     each row goes on from the one before it, in the parts along free motions, too, or a pair is not found again.
     """
-    ends = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
     scene = replace(
-        floating(ends, (0.0, 130.0), distributed=lambda c: (0.0, 0.0, c.P)),
+        thrust((0.0, 130.0)),
         energy=lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 0.8)),
         inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (rotary, rotary, rotary)),
     )
@@ -128,7 +119,7 @@ def test_thrust_of_a_rod_that_bends_unlike_in_its_planes(rotary: float) -> None:
 def with_mass_at_nose(m: float, stiffness: tuple[float, float, float], span: tuple[float, float]) -> Scene:
     """A rod of mass 1 that a thrust at its tail accelerates, with a mass ``m`` at its nose."""
     return replace(
-        floating((free(lambda c: (0.0, 0.0, c.P * m / (1 + m))), free(follower=lambda c: (0.0, 0.0, -c.P))), span,
+        floating((free(lambda c: (0.0, 0.0, c.P * m / (1 + m))), free(follower=push)), span,
                  distributed=lambda c: (0.0, 0.0, c.P / (1 + m))),
         attachments=(Attachment(0.0, mass=lambda c: m),),
         energy=lambda v, k, c: bending_and_twist(k, stiffness),
@@ -200,12 +191,10 @@ def test_ring_under_a_pressure_that_follows(monkeypatch: pytest.MonkeyPatch) -> 
     eigenvalues vanish but for round-off.
     """
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 11)
-    C, ring = 0.7, lambda s: np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1)
-    scene = Scene(
-        "pressed", (0.0, 2 * pi), "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (1.0, 9.0, C)), {"P": Parameter(0.0)}, "P", Ring(),
-        Ordinate("width", s=pi, of=lambda r, q: float(np.linalg.norm(r))), (0.0, 10.0), start=ring,
-        follower=lambda c: (c.P, 0.0, 0.0), inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.1)),
+    scene = column(
+        "pressed", Ring(), (0.0, 10.0), **ROUND, start=circle, follower=lambda c: (c.P, 0.0, 0.0),
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (1.0, 9.0, 0.7)),
+        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.1)),
     )  # fmt: skip
     found = rodfem.trace(scene, Discretization("pointwise", 12, 6))
     assert {3.0, 8.0} < {p.load for p in found[0].points}
@@ -217,11 +206,11 @@ def test_ring_under_a_pressure_that_follows(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.long
 def test_forces_that_nothing_balances() -> None:
-    one_sided = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
+    one_sided = (free(), free(follower=push))
     with pytest.raises(SceneError, match="nothing holds the rod against"):
         rodfem.trace(floating(one_sided, (0.0, 5.0)), MESH, Plan(depth=0))
     with pytest.raises(SceneError, match="nothing holds the rod against"):
-        floating((free(), free(lambda c: (0.0, 0.0, -c.P))), (0.0, 5.0))
+        floating((free(), free(push)), (0.0, 5.0))
     with pytest.raises(SceneError, match="not the state that a small P leads on from"):
         rodfem.trace(floating((free(), free()), (0.0, 5.0), distributed=lambda c: (0.0, 0.0, -c.P)), MESH)
 
@@ -241,8 +230,7 @@ def test_states_of_a_rod_that_a_thrust_accelerates() -> None:
 
     Their eigenvalue, zero, took the digits of all others next to zero: the verdict was one complex eigenvalue.
     """
-    thrust = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
-    solver = Solver(floating(thrust, (1e-6, 50.0), distributed=lambda c: (0.0, 0.0, c.P)), MESH)
+    solver = Solver(thrust((1e-6, 50.0)), MESH)
     point = solver.equilibrium(1e-6)
     verdict = solver.assess(point, number=4)
     assert verdict.negative == 0 and max(verdict.errors) < 1e-12
@@ -262,8 +250,7 @@ def test_states_of_a_rod_that_a_thrust_accelerates() -> None:
 
 def test_momentum_of_modes_under_a_thrust() -> None:
     """A thrust that turns with the tip by ``u'`` moves the centre of mass: ``mu int u ds = P u'(1)``."""
-    thrust = (free(), free(follower=lambda c: (0.0, 0.0, -c.P)))
-    solver = Solver(floating(thrust, (1e-6, 50.0), distributed=lambda c: (0.0, 0.0, c.P)), MESH)
+    solver = Solver(thrust((1e-6, 50.0)), MESH)
     modes = solver.modes(solver.equilibrium(20.0), 2)
     for value, u, turned in zip(modes.value, modes.displacement, modes.rotation, strict=True):
         slope = 20.0 * np.cross(turned[-1], (0.0, 0.0, 1.0))

@@ -1,14 +1,16 @@
 """Initial postbuckling (Koiter): coefficients in closed form, what turns back at once, and sides that differ."""
 
+from dataclasses import replace
 from math import pi, sqrt
 from typing import Any
 
+import classics
 import numpy as np
 import pytest
-from classics import ON_AXIS, RIGID, circle, column, push
+from classics import ON_AXIS, column, push
 
 import rodfem
-from rodfem import Diagram, Discretization, Ordinate, Parameter, Plan, Ring, Scene, clamped, pinned, sliding
+from rodfem import Diagram, Discretization, Ordinate, Plan, Ring, clamped, pinned, sliding
 from rodfem.forms.energy import bending_and_twist
 
 ACROSS = Ordinate("middle", s=0.5, of=lambda r, q: float(r[0]))
@@ -114,11 +116,8 @@ def test_ring_of_intrinsic_twist(C: float) -> None:
 
     ``x`` is the twist in turns that it loses.  The coefficient is that of the expansion about the circle.
     """
-    ring = Scene(
-        "michell", (0.0, 2 * pi), RIGID, lambda v, k, c: bending_and_twist((k[0], k[1], k[2] - c.t), (1.0, 1.0, c.C)),
-        {"t": Parameter(1.0), "C": Parameter(C)}, "t", Ring(),
-        Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi)), (1.0, 1.6), start=circle,
-    )  # fmt: skip
+    twist = Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi))
+    ring = replace(classics.ring().varying("k", (1.0, 1.6), C=C), ends=Ring(), ordinate=twist)
     plan = Plan(depth=1, most_branches=2, error_bars=False)
     found = rodfem.trace(ring, Discretization(elements=14, degree=6), plan).special("branch point", "ring")[0]
     assert abs(found.point.load - sqrt(3) / C) < 1e-9

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
-from classics import FORMULATIONS, ON_AXIS, RIGID, column, explore, push, sweep
+from classics import FORMULATIONS, ON_AXIS, ROUND, circle, column, explore, push, sweep
 from closed_forms import flutter, tip
 from scipy.linalg import eigvals, expm
 from scipy.optimize import brentq
@@ -242,11 +242,10 @@ def test_ring_with_too_much_curvature(n: int) -> None:
     """``m^2 - (B + C) m - B C (n^2 - 1) = 0`` for the moment ``m = 1 - k0`` of a ring that is curved by k0 when cut."""
     B, C = 1.0, 0.7
     k0 = 1 - ((B + C) - sqrt((B + C) ** 2 + 4 * B * C * (n * n - 1))) / 2
-    ring = Scene(
-        "overcurved", (0.0, 2 * pi), RIGID, lambda v, k, c: bending_and_twist((k[0], k[1] - c.k0, k[2]), (B, 1.0, C)),
-        {"k0": k0 - 0.4}, "k0", Ring(), Ordinate("width", s=pi, of=lambda r, q: hypot(*r)), (k0 - 0.4, k0 + 0.3),
-        start=lambda s: np.stack([np.cos(s / 2), 0 * s, np.sin(s / 2), 0 * s], axis=1),
-    )  # type: ignore[arg-type]  # fmt: skip
+    ring = column(
+        "overcurved", Ring(), (k0 - 0.4, k0 + 0.3), load="k", start=circle, **ROUND,
+        energy=lambda v, k, c: bending_and_twist((k[0], k[1] - c.k, k[2]), (B, 1.0, C)),
+    )  # fmt: skip
     assert explore(ring, elements=10).loads() == pytest.approx([k0], rel=1e-9)
 
 

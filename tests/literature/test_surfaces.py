@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
+from classics import column
 
 import rodfem
 from rodfem import (
     Discretization,
     Ordinate,
-    Parameter,
     Plan,
-    Scene,
     clamped,
     everywhere,
     free,
@@ -22,7 +21,6 @@ from rodfem import (
     sliding,
     tabulated,
 )
-from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.ranks
 
@@ -34,20 +32,13 @@ def push(c: Any) -> tuple[float, float, Any]:
     return (0.0, 0.0, -c.F)
 
 
-TUBE = Scene(
-    name="tube",
-    interval=(0.0, 1.0),
-    rod="unshearable and inextensible",
-    energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-    parameters={"F": Parameter(0.0)},
-    load="F",
-    ends=(pinned(LOW), pinned((*LOW[:2], None), force=push)),
-    distributed=lambda c: (-PRESSURE, 0.0, 0.0),
+TUBE = column(
+    "tube", (pinned(LOW), pinned((*LOW[:2], None), force=push)), (0.0, 66.0), load="F",
+    constants={"F": 0.0, "B2": 1.0}, distributed=lambda c: (-PRESSURE, 0.0, 0.0),
     constraints=(
         everywhere(lambda x, c: (x.r[0] ** 2 + x.r[1] ** 2 - RADIUS**2) / (2 * RADIUS), strain=False),
     ),
     ordinate=Ordinate("y", s=0.5, of=lambda r, q: r[1]),
-    span=(0.0, 66.0),
 )  # fmt: skip
 AXIS = (1.0, 0.0, 0.0)
 ENDS = {

@@ -5,6 +5,7 @@ from math import acos, pi
 from pathlib import Path
 from typing import Any
 
+import classics
 import numpy as np
 import pytest
 from closed_forms import column, tip
@@ -12,35 +13,23 @@ from hard.loci import LONG
 from scipy.optimize import fsolve
 
 import rodfem
-from rodfem import Attachment, Discretization, Drag, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free
+from rodfem import Attachment, Discretization, Drag, Inertia, Ordinate, Plan, Scene, clamped, free
 from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
 
-FILAMENT = Scene(
-    name="filament",
-    interval=(0.0, 1.0),
-    rod="unshearable and inextensible",
-    energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-    parameters={"F": Parameter(0.0), "part": Parameter(1.0)},
-    load="F",
-    ends=(
-        clamped(),
-        free(force=lambda c: (0.0, 0.0, (c.part - 1) * c.F), follower=lambda c: (0.0, 0.0, -c.part * c.F)),
-    ),
-    inertia=Drag(across=1.0),
+FILAMENT = classics.column(
+    "filament",
+    (clamped(), free(force=lambda c: (0.0, 0.0, (c.part - 1) * c.F), follower=lambda c: (0.0, 0.0, -c.part * c.F))),
+    (0.0, 60.0), load="F", constants={"F": 0.0, "part": 1.0, "B2": 1.0}, inertia=Drag(across=1.0), planar="e2",
     ordinate=Ordinate("deflection", s=1.0, of=lambda r, q: r[0]),
-    span=(0.0, 60.0),
-    planar="e2",
-)
+)  # fmt: skip
 IN_SPACE = replace(
     FILAMENT, planar=None, span=(36.69543084032, 39.19543084032)
 )  # with the critical one among its loads
 ALONG = replace(FILAMENT, ends=(clamped(), free()), follower=lambda c: (0.0, 0.0, -c.F), span=(40.0, 100.0))
 
 
-@pytest.fixture(autouse=True)
-def few_loads(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 26)
+pytestmark = pytest.mark.usefixtures("few_loads")
 
 
 @pytest.mark.parametrize(

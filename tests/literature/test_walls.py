@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 import ufl
+from classics import SUPPORTS, column
 
-from rodfem import Ordinate, Parameter, Plan, Scene, pinned, trace
-from rodfem.forms.energy import bending_and_twist
+from rodfem import Ordinate, Plan, trace
 
 HALF, STEEP, WEAK = 0.05, 0.001, 1e-4
 EXPONENTIAL = pi**2, lambda x, c: STEEP * (ufl.exp((x.r[0] - HALF) / STEEP) + ufl.exp((-x.r[0] - HALF) / STEEP))
@@ -21,19 +21,10 @@ def test_a_strut_between_walls(load: float, wall: Callable[[Any, Any], Any]) -> 
 
     Pressed to a wall in its middle, ``y = A (sin k s - k s cos(k/2))``, ``k^2 = P``; rigid walls are within 5 %.
     """
-    strut = Scene(
-        "walls",
-        (0.0, 1.0),
-        "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-        {"P": Parameter(0.0)},
-        "P",
-        (pinned(), pinned((0.0, 0.0, None), lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("quarter", s=0.25, of=lambda r, q: r[0]),
-        (0.0, 20.0),
-        planar="e2",
-        potential=wall,
-    )
+    strut = column(
+        "walls", SUPPORTS["pinned-pinned"], (0.0, 20.0), planar="e2", constants={"B2": 1.0}, potential=wall,
+        ordinate=Ordinate("quarter", s=0.25, of=lambda r, q: r[0]),
+    )  # fmt: skip
     diagram = trace(strut, plan=Plan(depth=1, at=(15.0,)))
     found, pressed = diagram.special("branch point")[0], diagram[1]
     assert abs(found.point.load - load) <= found.error_estimate < 1e-9

@@ -5,6 +5,7 @@ from itertools import pairwise
 from math import hypot, pi
 from typing import Any
 
+import classics
 import numpy as np
 import pytest
 import ufl
@@ -17,7 +18,6 @@ from rodfem import (
     Discretization,
     Inertia,
     Ordinate,
-    Parameter,
     Plan,
     Scene,
     clamped,
@@ -74,11 +74,10 @@ def wave(s: Any) -> Any:
 
 def column(EI: Callable[[Any], Any], length: float = 1.0, size: float = 1.0) -> Scene:
     """Cantilever under a dead load, of a length and a stiffness in any units."""
-    return Scene(
-        "column", (0.0, length), "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (EI(c.s), 20.0 * size, size)), {"P": Parameter(0.0)}, "P",
-        (clamped(), free(lambda c: (0.0, 0.0, -c.P))), Ordinate("tip", s=length, of=TIP.of),
-        (0.0, 4 * size / length**2),
+    return classics.column(
+        "column", classics.SUPPORTS["clamped-free"], (0.0, 4 * size / length**2), interval=(0.0, length),
+        energy=lambda v, k, c: bending_and_twist(k, (EI(c.s), 20.0 * size, size)),
+        ordinate=Ordinate("tip", s=length, of=TIP.of),
     )  # fmt: skip
 
 
@@ -141,10 +140,9 @@ def test_curvature_load_and_mass() -> None:
         return (2 * cos(3 * s), 6 + sin(5 * s), 1 + 0 * s)
 
     def coil(k0: Callable[[Any], Any], weight: Callable[[Any], Any]) -> Diagram:
-        scene = Scene(
-            "coil", (0.0, 1.0), "unshearable and inextensible",
-            lambda v, k, c: bending_and_twist([k[i] - k0(c.s)[i] for i in range(3)], (1.0, 1.0, 0.7)),
-            {"T": Parameter(20.0)}, "T", (clamped(), free(lambda c: (0.0, 0.0, c.T))), TIP, (20.0, 10.0),
+        scene = classics.column(
+            "coil", (clamped(), free(lambda c: (0.0, 0.0, c.P))), (20.0, 10.0),
+            energy=lambda v, k, c: bending_and_twist([k[i] - k0(c.s)[i] for i in range(3)], (1.0, 1.0, 0.7)),
             distributed=lambda c: (0.0, weight(c.s), 0.0), inertia=Inertia(rho_A=lambda c: weight(c.s)),
         )  # fmt: skip
         return trace(scene, Discretization("auto", 12, 6), Plan(depth=0))
@@ -163,11 +161,10 @@ def test_curvature_load_and_mass() -> None:
 
 def moved(place: Callable[[Any], Any], turn: Any, push: Any, span: Sequence[float], **plan: Any) -> Diagram:
     """Rod whose right end is moved and turned, and which is pushed in its middle, as functions of ``t``."""
-    scene = Scene(
-        "moved", (0.0, 1.0), "unshearable",
-        lambda v, k, c: 100 * (v[2] - 1) ** 2 + bending_and_twist(k, (1.0, 2.0, 1.0)), {"t": Parameter(0.0)}, "t",
-        (clamped(), clamped(lambda c: place(c.t), (lambda c: turn(c.t)) if turn else FIXED)),
-        MIDDLE, (span[0], span[1]),
+    scene = classics.column(
+        "moved", (clamped(), clamped(lambda c: place(c.t), (lambda c: turn(c.t)) if turn else FIXED)),
+        (span[0], span[1]), rod="unshearable", load="t", constants={"t": 0.0}, ordinate=MIDDLE,
+        energy=lambda v, k, c: 100 * (v[2] - 1) ** 2 + bending_and_twist(k, (1.0, 2.0, 1.0)),
         attachments=(Attachment(0.5, force=lambda c: (0.0, push(c.t), 0.0)),) if push else (),
     )  # fmt: skip
     return trace(scene, MESH, Plan(depth=0, **plan))
@@ -215,12 +212,8 @@ def test_corners_in_a_sweep() -> None:
     """A follower load that grows in pieces: flutter where it is with a load that grows evenly."""
 
     def beam(load: Callable[[Any], Any], end: float) -> Diagram:
-        ends = clamped(), free(follower=lambda c: (0.02 * load(c.t), 0.0, -load(c.t)))
-        return trace(Scene(
-            "beam", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)),
-            {"t": Parameter(0.0)}, "t", ends, TIP, (0.0, end),
-            inertia=Inertia(lambda c: 1.0, lambda c: (0.0, 0.0, 0.0)),
-        ), MESH, Plan(depth=0))  # fmt: skip
+        ends = clamped(), free(follower=lambda c: (0.02 * load(c.P), 0.0, -load(c.P)))
+        return trace(classics.column("beam", ends, (0.0, end), inertia=classics.BEAM), MESH, Plan(depth=0))
 
     force = path([0, 0.97, 2.03, 3], [0, 10, 12, 30], smooth=False)
     by_rows, evenly = beam(force, 3.0), beam(lambda t: t, 30.0)
@@ -283,9 +276,4 @@ def test_a_table_as_nested_conditionals_is_refused_in_a_sentence() -> None:
         return value
 
     with pytest.raises(SceneError, match=r"nested deeper than UFL can follow: give a table, as in rodfem.tabulated"):
-        Scene(
-            "nested", (0.0, 1.0), "unshearable and inextensible",
-            lambda v, k, c: 0.5 * stiffness(c.s) * (k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
-            {"P": Parameter(0.0)}, "P", (clamped(), free(lambda c: (0.0, 0.0, -c.P))),
-            Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (0.0, 1.0),
-        )  # fmt: skip
+        column(stiffness)

@@ -348,8 +348,7 @@ def sizes(name: str, formulation: str, coordinates: str, elements: int, degree: 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("n", [5])
-def test_sizes_for_linear_elements_are_those_of_the_paper(n: int) -> None:
+def test_sizes_for_linear_elements_are_those_of_the_paper(n: int = 5) -> None:
     assert sizes("cord", "pointwise", "tangent", n, 1) == (6 * n - 5, 3 * n)
     assert sizes("cord", "reduced", "tangent", n, 1) == (3 * (n - 1), 2)
     assert sizes("hemitropic", "pointwise", "compatible", n, 1) == (6 * (n - 1), 2 * n)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from classics import column
 
 from rodfem import (
     Discretization,
@@ -19,10 +20,12 @@ from rodfem import (
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import SceneError
+from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.dependence import require_independent_constraints
 
 pytestmark = pytest.mark.ranks
 
+MIDDLE = Ordinate("middle", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1])))
 PLAN = Plan(depth=0, steps=StepControl(most=3), error_bars=False)
 
 
@@ -35,12 +38,11 @@ def shortened(far: Any = clamped, near: Any = clamped, rod: str = "unshearable a
     """A straight column whose far end comes nearer by P."""
 
     def energy(v: Any, k: Any, c: Any) -> Any:
-        bent = 0.5 * (k[0] ** 2 + 1.2 * k[1] ** 2 + k[2] ** 2)
+        bent = bending_and_twist(k, (1.0, 1.2, 1.0))
         return bent + 30 * (v[0] ** 2 + v[1] ** 2) if rod == "inextensible" else bent
 
     ends = near(), far(lambda c: (0.0, 0.0, 1 - c.P))
-    middle = Ordinate("middle", s=0.5, of=lambda r, q: float(np.hypot(r[0], r[1])))
-    return Scene("shortened", (0.0, 1.0), rod, energy, {"P": 0.0}, "P", ends, middle, **({"span": (0.0, 0.3)} | more))
+    return column("shortened", ends, rod=rod, energy=energy, ordinate=MIDDLE, **{"span": (0.0, 0.3)} | more)
 
 
 def solver_of(scene: Scene, formulation: str, mesh: tuple[int, int], factors: str = "chain") -> BranchSolver:

@@ -7,8 +7,7 @@ import classics
 import numpy as np
 import pytest
 
-from rodfem import Attachment, Discretization, Inertia, Ordinate, Plan, Scene, Solver, clamped, free, trace
-from rodfem.forms.energy import bending_and_twist
+from rodfem import Attachment, Discretization, Plan, Scene, Solver, clamped, free, trace
 from rodfem.stability.motion_names import STRAIGHT
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -17,12 +16,9 @@ EA = 40.0
 
 def pushed(body: float) -> Scene:
     """Beck's column of unit length, stiffness and mass, four times as stiff across, with a ``body`` at its tip."""
-    return Scene(
-        "pushed", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, 4.0, 2.0)),
-        {"P": 0.0, "m": body}, "P", (clamped(), free(follower=lambda c: (0.0, 0.0, -c.P))),
-        attachments=(Attachment(1.0, mass=lambda c: c.m),),
-        inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),
-        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]), span=(0.0, 20.19),
+    return classics.column(
+        "pushed", (clamped(), free(follower=classics.push)), (0.0, 20.19), constants={"B2": 4.0, "C": 2.0, "m": body},
+        attachments=(Attachment(1.0, mass=lambda c: c.m),), inertia=classics.BEAM,
     )  # fmt: skip
 
 

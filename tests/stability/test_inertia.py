@@ -108,22 +108,6 @@ def test_close_eigenvalues_nearest_zero() -> None:
     np.testing.assert_allclose(sorted(values), sorted(expected), rtol=1e-9)
 
 
-@pytest.mark.ranks
-@pytest.mark.versions
-@FORMULATIONS
-@STATES
-def test_spectrum_is_that_of_dense_matrices(formulation: str, branch: int, load: float) -> None:
-    f, p = follower(formulation, *SMALL), state(formulation, branch, load)
-    f.system.set_phase(p.x)
-    spectrum = SymmetricSolver(f.inertia)
-    modes = spectrum.at(p.x).leftmost(6)
-    mu = eigenvalues(dense(spectrum.matrix), dense(spectrum.mass), f)
-    mu = mu[abs(mu) > f.inertia.tolerance]
-    np.testing.assert_allclose(modes.values, mu[:6], rtol=1e-7, atol=1e-9)
-    assert modes.certified
-    assert (modes.values < -f.inertia.tolerance).sum() == p.negative
-
-
 @pytest.mark.few(1)
 def test_the_matrix_is_kept_for_the_state_that_it_holds() -> None:
     """Asked for the same state again it is not assembled or factored; it is after a shift, and for another state."""

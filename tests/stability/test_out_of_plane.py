@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from classics import column
 
-from rodfem import Discretization, Ordinate, Parameter, Scene, Solver, clamped
-from rodfem.forms.energy import bending_and_twist
+from rodfem import Discretization, Ordinate, Solver, clamped
 
 pytestmark = pytest.mark.ranks
 
@@ -20,10 +20,9 @@ def test_a_planar_start_keeps_its_whole_turn() -> None:
         return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=1)
 
     ends = clamped(), clamped(lambda c: (0.0, 0.0, c.d))
-    planar = Scene(
-        "loop", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-        {"d": Parameter(0.2)}, "d", ends, Ordinate("width", s=0.5, of=lambda r, q: r[0]), (0.2, 0.8),
-        planar="e2", start=start,
+    planar = column(
+        "loop", ends, (0.2, 0.8), load="d", constants={"d": 0.2, "B2": 1.0}, planar="e2", start=start,
+        ordinate=Ordinate("width", s=0.5, of=lambda r, q: r[0]),
     )  # fmt: skip
     one, other = (Solver(scene, Discretization("reduced", 8, 6)) for scene in (planar, replace(planar, planar=None)))
     for d, index in ((0.2, 0), (0.5, 1)):

@@ -11,7 +11,7 @@ from classics import column
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem import Attachment, ConvergenceError, Discretization, Ordinate, Scene, Solver, clamped, free
+from rodfem import Attachment, ConvergenceError, Discretization, Scene, Solver, clamped, free
 from rodfem.continuation.first_equilibrium import examined, first_equilibrium, is_stable
 from rodfem.fem.newton import NewtonResult
 from rodfem.linalg.matrices import rounding
@@ -80,10 +80,9 @@ def test_a_band_wider_than_the_lowest_eigenvalue(place: float) -> None:
 
 def stiffening(load: float) -> Scene:
     """A cantilever that stiffens as ``cosh``, with a force at its tip."""
-    return Scene(
-        "stiffening", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: sum(ufl.cosh(x) - 1 for x in k),
-        {"P": 0.0}, "P", (clamped(), free(lambda c: (c.P, 0.0, 0.0))),
-        Ordinate("x", s=1.0, of=lambda r, q: r[0]), (0.0, load),
+    return column(
+        "stiffening", (clamped(), free(lambda c: (c.P, 0.0, 0.0))), (0.0, load),
+        energy=lambda v, k, c: sum(ufl.cosh(x) - 1 for x in k),
     )  # fmt: skip
 
 

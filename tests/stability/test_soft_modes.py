@@ -18,7 +18,6 @@ from rodfem import (
     Diagram,
     Discretization,
     Ordinate,
-    Parameter,
     Plan,
     Scene,
     Solver,
@@ -218,10 +217,9 @@ def test_a_sign_that_is_the_error_of_the_mesh(elements: int) -> None:
         half = 0.1 * np.sin(2 * pi * s)
         return np.stack([np.cos(half), 0 * s, np.sin(half), 0 * s], axis=1)
 
-    strip = Scene(
-        "passed", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-        {"d": Parameter(0.01)}, "d", (clamped(), clamped(lambda c: (0.0, 0.0, 1 - c.d))),
-        Ordinate("height", s=0.5, of=lambda r, q: r[0]), (0.01, 1.95), planar="e2", start=start,
+    strip = column(
+        "passed", (clamped(), clamped(lambda c: (0.0, 0.0, 1 - c.d))), (0.01, 1.95), load="d", planar="e2", start=start,
+        constants={"d": 0.01, "B2": 1.0}, ordinate=Ordinate("height", s=0.5, of=lambda r, q: r[0]),
     )  # fmt: skip
     found = trace(strip, Discretization("reduced", elements, 6), Plan(depth=0))
     (point,) = found.special("branch point")
@@ -245,10 +243,9 @@ def test_a_mesh_that_cannot_hold_the_turns_decides_no_index() -> None:
     def start(s: np.ndarray) -> np.ndarray:
         return np.stack([np.cos(22.0 * s), 0 * s, 0 * s, np.sin(22.0 * s)], axis=1)
 
-    shaft = Scene(
-        "shaft", (0.0, 1.0), "unshearable and inextensible", lambda v, k, c: bending_and_twist(k, (1e3, 1e3, 1.0)),
-        {"phi": Parameter(0.0)}, "phi", (clamped(), sliding((0.0, 0.0, None), turned)),
-        Ordinate("deflection", s=0.5, of=lambda r, q: r[1]), (44.0, 45.0), start=start,
+    shaft = column(
+        "shaft", (clamped(), sliding((0.0, 0.0, None), turned)), (44.0, 45.0), load="phi", start=start,
+        constants={"phi": 0.0, "B1": 1e3, "B2": 1e3}, ordinate=Ordinate("deflection", s=0.5, of=lambda r, q: r[1]),
     )  # fmt: skip
     found = trace(shaft, Discretization("reduced", 4, 6), Plan(depth=0))
     assert [(row.negative, row.undecided) for row in found[0].points] == [(0, 4)] * len(found[0].points)
