@@ -277,9 +277,14 @@ class Enriched:
 
 def last_admissible(solver: BranchSolver, a: Point, b: Point) -> Point:
     """The point between ``a`` and ``b`` at which the smallest stretch vanishes."""
-    arc, first = Arc(solver, a, b), a.arclength + INSIDE * (b.arclength - a.arclength)
-    along = 1e-11  # an arclength, in the metric
-    return arc.point(zero_between(lambda s: solver.shape.stretch(arc.state(s)), first, b.arclength, along))
+    arc, h = Arc(solver, a, b), b.arclength - a.arclength
+    first, along = a.arclength + INSIDE * h, 1e-11  # an arclength, in the metric
+    known = zero_between(lambda s: solver.shape.stretch(arc.curve(s)[0]), first, b.arclength, along)
+    stretch = cache(lambda s: solver.shape.stretch(arc.state(s)))
+    ends = max(first, known - 1e-3 * h), min(b.arclength, known + 1e-3 * h)  # the curve is nearly right
+    if not stretch(ends[0]) > 0 >= stretch(ends[1]):
+        ends = first, b.arclength
+    return arc.point(zero_between(stretch, *ends, along))
 
 
 def before_the_end(solver: BranchSolver, a: Point, last: Point) -> Point | None:

@@ -83,11 +83,11 @@ class Adjoint:
         images, rates = dict[tuple[int, int], PETSc.Vec](), np.zeros((len(null), len(null)))
         for i, v in enumerate(null):
             for step, weight in SHARP:
-                there = self.solver.inertia.moved(self.x + v * (step * DIFFERENCE))
                 share = weight / (2 * DIFFERENCE)
-                rates[i] += [share * there.border.dot(other) for other in null]
-                for j in range(i, len(null)):
-                    images.setdefault((i, j), self.system.new_vector()).axpy(share, states.image(there.matrix, null[j]))
+                *parts, force = states.images(self.x + v * (step * DIFFERENCE), null[i:])
+                rates[i] += [share * force.dot(other) for other in null]
+                for j, part in enumerate(parts, i):
+                    images.setdefault((i, j), self.system.new_vector()).axpy(share, part)
         return images, rates
 
     def _normalise(self, rates: np.ndarray) -> None:
@@ -123,7 +123,7 @@ class Adjoint:
         self.system.set_load(there, at[parameter])
         self.system.line = line(scene, {**at, parameter: 0.0}, {parameter: 1.0})
         try:
-            return self.solver.inertia.moved(there).border.copy()
+            return self.solver.inertia.force(there)
         finally:
             self.system.line = before
 

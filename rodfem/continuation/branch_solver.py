@@ -7,10 +7,10 @@ last row is.
 *Tangent and index of a regular point* are those of one symmetric factorisation at that state.  With ``F_lam``, the
 derivative of the equations in the load, ``z = (-S^-1 F_lam, 1)`` is a tangent, and the inertia of the factors of the
 saddle matrix ``S`` is the index (:mod:`rodfem.stability.inertia`).  ``S`` is singular at a fold, and a count says
-nothing about eigenvalues within its tolerance: both show in the same solves.  A block of vectors ``v`` is carried along
-the branch and iterated inversely, once a point; the least ``|v| / |S^-1 M v|`` is an upper bound of the distance of the
-nearest eigenvalue from zero, and an estimate as good as the block is rich in its vector, as 1e-3 of a generic vector is
-added every time.  If that is too near zero, the tangent is by LU factors of the bordered matrix, and two shifts count.
+nothing about eigenvalues within its tolerance: both show in the same solves.  Of vectors ``v``, generic ones and
+the border of the branch (:mod:`rodfem.stability.reduced_stiffness`), the least ``|v| / |S^-1 M v|`` is an upper bound
+of the distance of the nearest eigenvalue from zero, and an estimate as good as they are rich in its vector.  If that is
+too near zero, the tangent is by LU factors of the bordered matrix, and two shifts count.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.units import Units
 from rodfem.stability.in_space import InSpace
-from rodfem.stability.inertia import DOUBTFUL, FRESH, Factored, Index, Inertia
+from rodfem.stability.inertia import DOUBTFUL, Index, Inertia
 from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.symmetric import SymmetricSolver
@@ -51,7 +51,7 @@ ALIGNED = 0.9
 ROWS = 4
 """Rows of a branch that a prediction extrapolates, at most."""
 BLOCK = 2
-"""Number of vectors that are iterated along a branch."""
+"""Number of generic vectors that show a singular state."""
 
 
 class Knot(Protocol):
@@ -163,15 +163,10 @@ class RegularPoints:
 
     def __init__(self, inertia: Inertia) -> None:
         self.inertia, self.system = inertia, inertia.system
-        self._fresh = np.stack([inertia.seed(i).array_r.real for i in range(BLOCK)], axis=1)
-        self._fresh_images = inertia.weighed(self._fresh)
+        generic = np.stack([inertia.seed(i).array_r.real for i in range(BLOCK)], axis=1)
+        self._generic = inertia.weighed(generic / inertia.sizes(generic))
         self._state: tuple[State | None, Phase | None, float] = None, None, 0.0
         self._found: RegularPoint | None = None
-        self.restart()
-
-    def restart(self) -> None:
-        """Begin a branch: nothing is known about its eigenvectors."""
-        self._block, self._images, self._started = self._fresh, self._fresh_images, False
 
     def at(self, x: PETSc.Vec) -> RegularPoint | None:
         """The regular point ``x``; None where an eigenvalue is too near zero, or a load has no potential."""
@@ -189,41 +184,20 @@ class RegularPoints:
             below = found.eigenvalue_count(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
             return None
-        # inverse iteration: one step a point along a branch, three from generic vectors
-        for _ in range(1 if self._started else 3):
-            own, nearest = self._solve(found)
-        if nearest < DOUBTFUL * inertia.scale:
-            own, nearest = self._solve(found)
-        self._started = nearest > inertia.regular
-        if not self._started:
-            self.restart()
+        right = np.column_stack([found.border.array_r.real, self._generic])
+        with self.system.clock("solve"):
+            solved = found.solutions(right)
+        size = inertia.sizes(grown := solved[:, 1:])
+        if np.isfinite(size).all() and size.max() * DOUBTFUL * inertia.scale > 1.0:  # once more
+            size = inertia.sizes(found.factors.solve_all(inertia.weighed(grown / size)))
+        # |S^-1 M v| / |v| is at most one over the distance of the nearest eigenvalue from zero
+        nearest = 1.0 / max(float(size.max()), TINY) if np.isfinite(size).all() else 0.0
+        if not nearest > inertia.regular:
             return None
-        tangent = self.system.new_vector()
-        tangent.array[:] = own
+        tangent = self.system.new_vector(-solved[:, 0])
         self.system.set_load(tangent, 1.0)
         tangent.scale(1.0 / self.system.norm(tangent))
         return RegularPoint(Index(below, found.drifts, nearest), tangent)
-
-    def _solve(self, found: Factored) -> tuple[np.ndarray, float]:
-        """Change of state with the load, and the distance of the nearest eigenvalue: a step of inverse iteration."""
-        inertia = self.inertia
-        block = self._block + FRESH * self._fresh
-        images = self._images + FRESH * self._fresh_images
-        sizes = np.sqrt(inertia.sum((images * block).sum(axis=0)))
-        with self.system.clock("solve"):
-            solved = found.factors.solve_all(np.column_stack([found.border.array_r.real, images]))
-        # |S^-1 M v| / |v| is at most one over the distance of the nearest eigenvalue from zero
-        block = solved[:, 1:]
-        images = inertia.weighed(block)
-        grown = np.sqrt(np.maximum(inertia.sum((images * block).sum(axis=0)), TINY))
-        growth = float((grown / sizes).max()) if np.isfinite(grown).all() else inf
-        block, images = block / grown, images / grown
-        for i in range(1, BLOCK):  # else all vectors of the block become the same one
-            along = inertia.sum(images[:, i] @ block[:, :i])
-            block[:, i] -= block[:, :i] @ along
-            images[:, i] -= images[:, :i] @ along
-        self._block, self._images = block, images
-        return -solved[:, 0], 1.0 / growth
 
 
 @dataclass(frozen=True)

@@ -134,6 +134,11 @@ def _size(matrices: np.ndarray, scales: np.ndarray) -> np.ndarray:
     return np.asarray((vectors * (abs(values) / scales[:, None])[:, None, :] @ vectors.swapaxes(1, 2)).sum(axis=0))
 
 
+def off(a: Node, b: Node, size: np.ndarray) -> np.ndarray:
+    """What the cubic may be off in the middle, by the ``size`` of a :func:`fourth` derivative."""
+    return np.asarray(SAFE * (b.s - a.s) ** 4 / 16 * size)
+
+
 def clear(a: Node, b: Node, off: np.ndarray) -> bool:
     """Whether ``H``, from which the cubic is ``16 t^2 (1 - t)^2 off`` at most, is regular between two nodes.
 
@@ -165,12 +170,12 @@ class Zeros:
 
     def crossings(self, a: Node, b: Node, size: np.ndarray, depth: int = 0) -> list[Crossing]:
         """All crossings in a piece divided ``depth`` times, by the ``size`` of its :func:`fourth` derivative."""
-        off = SAFE * (b.s - a.s) ** 4 / 16 * size
-        if clear(a, b, off):
+        bound = off(a, b, size)
+        if clear(a, b, bound):
             return []
         found = roots(a, b)
         groups = together(a, b, found, self.tolerance)
-        t, miss = _division(a, b, found, groups, off)
+        t, miss = _division(a, b, found, groups, bound)
         short = depth >= DEEPEST or b.s - a.s <= SHORTEST
         middle = None if t is None or short else self.solve(a, b, a.s + t * (b.s - a.s))
         if middle is None:
@@ -224,7 +229,7 @@ def _alone(a: Node, b: Node, group: list[float], off: np.ndarray) -> bool:
     t = PLACES[:, None, None]
     A = coefficients(a, b)
     values, vectors = np.linalg.eigh(A[0] + t * (A[1] + t * (A[2] + t * A[3])))
-    doubt = np.einsum("t,tki,kl,tli->ti", 16 * PLACES**2 * (1 - PLACES) ** 2, vectors, off, vectors, optimize=True)
+    doubt = 16 * PLACES[:, None] ** 2 * (1 - PLACES[:, None]) ** 2 * (vectors * (off @ vectors)).sum(axis=1)
     return bool(((abs(values) <= doubt).sum(axis=1) <= near * len(group)).all())
 
 

@@ -45,7 +45,7 @@ END_OF_RANGE, MOST_REACHED = "end of range", "points reached"
 class StepControl:
     """Steps by the size of the correction, in the metric (root mean square rotation in radian, load over its span)."""
 
-    first: float = 0.02  #: length of the first step
+    first: float = 0.05  #: length of the first step
     largest: float = 0.15  #: bound of the step, which is also how coarse a branch is drawn
     smallest: float = 1e-5  #: length of a step at which a branch is given up
     aim: float = 1e-2  #: distance from prediction to correction that is aimed at
@@ -74,7 +74,7 @@ class StepControl:
     def after(self, step: float, moved: float, order: int) -> float:
         """Length of the next step; the correction ``moved`` the prediction, that of a predictor of an ``order``."""
         factor = (self.aim / max(moved, NEGLIGIBLE)) ** (1 / order)
-        return min(step * min(max(factor, 0.4), 1.6), self.largest)
+        return min(step * min(max(factor, 0.4), 3.0), self.largest)
 
     def accepts(self, before: Point, after: Point) -> bool:
         """Whether a step that has converged is kept; else half of it is tried."""
@@ -115,7 +115,6 @@ def follow(
     of the point becomes that of the other side.  The caller appends (and may insert) points in ``points``.  ``reach``
     bounds the step from a point.
     """
-    solver.regular.restart()
     walk = _Walk(solver, points, steps, bounds)
     while len(points) < steps.most and not walk.ended:
         if len(points) % 64 == 0:

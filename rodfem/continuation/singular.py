@@ -225,11 +225,22 @@ class SingularSystem:
         noise = max(self.inertia.at(x).noise(combine(at.V, z)) for z in at.Z.T)
         return bool(abs(self.system.scalar(step[0]) * at.rows[-1, 1]) <= noise * self.count)
 
-    def _matrix(self, x: PETSc.Vec, t: float, *, moved: bool = False) -> Factored:
-        """S at a state and a second parameter; ``moved`` from the last state, with its phase conditions."""
+    def _matrix(self, x: PETSc.Vec, t: float) -> Factored:
+        """S at a state and a second parameter."""
+        self._take(t)
+        return self.inertia.at(x)
+
+    def _take(self, t: float) -> None:
         if self._section is not None:
             self.system.line = self._section.line(t)
-        return self.inertia.moved(x) if moved else self.inertia.at(x)
+
+    def images(self, x: PETSc.Vec, vectors: Vectors, t: float = 0.0) -> list[PETSc.Vec]:
+        """``S^t W`` at a state near the last one, whose phase conditions stay, and ``F_lam``."""
+        self._take(t)
+        inertia, both = self.inertia, self.psi is self.phi
+        own = np.stack([v.array_r for v in (*vectors, *([self.solver.axis] if both else []))], axis=1)
+        found = self.system.vectors(inertia.images(x, own, transposed=not both))
+        return found if both else [*found, inertia.force(x)]
 
     def _second(self, x: PETSc.Vec, t: float) -> PETSc.Vec:
         """Derivative of the equations in the second parameter."""
@@ -237,7 +248,7 @@ class SingularSystem:
         there = x.copy()
         self.system.set_load(there, t)
         self.system.line = self._section.second(self.system.scalar(x))
-        return self.inertia.at(there).border.copy()
+        return self.inertia.force(there)
 
     def _modes(
         self, matrix: PETSc.Mat, columns: Vectors = ()
@@ -311,9 +322,9 @@ class SingularSystem:
                 there, share = x + v * (step * DIFFERENCE), weight / (2 * DIFFERENCE)
                 if self._section is not None:
                     f[1] += share * left.dot(self._second(there, t))
-                found = self._matrix(there, t, moved=True)
-                f[0] += share * left.dot(found.border)
-                y.axpy(share, self.image(found.matrix, left))
+                image, force = self.images(there, [left], t)
+                f[0] += share * left.dot(force)
+                y.axpy(share, image)
         return y, f
 
     def _along_load(self, x: PETSc.Vec, t: float, w: PETSc.Vec, left: Vectors) -> tuple[list[PETSc.Vec], np.ndarray]:
@@ -327,10 +338,10 @@ class SingularSystem:
             if self._section is not None:
                 second = self._second(there, t)
                 q[:, 1] += [share * v.dot(second) for v in left]
-            found = self._matrix(there, t, moved=True)
-            q[:, 0] += [share * v.dot(found.border) for v in left]
-            for image, v in zip(r, left, strict=True):
-                image.axpy(share, self.image(found.matrix, v))
+            *parts, force = self.images(there, left, t)
+            q[:, 0] += [share * v.dot(force) for v in left]
+            for image, part in zip(r, parts, strict=True):
+                image.axpy(share, part)
         return r, q
 
     def _work(self, at: _Linear) -> np.ndarray:
@@ -339,13 +350,6 @@ class SingularSystem:
         rows[:, 1 : 1 + at.q.shape[1]] += at.q
         rows[:, 0] -= at.Z.T @ at.b[:, 0]
         return rows
-
-    def image(self, matrix: PETSc.Mat, left: PETSc.Vec) -> PETSc.Vec:
-        """``S^t W``, which is known without a transpose where S is symmetric."""
-        image = matrix.createVecRight()
-        (matrix.mult if self.psi is self.phi else matrix.multTranspose)(left, image)
-        self.system.set_load(image, 0.0)
-        return image
 
     def _step(self, at: _Linear, moved: PETSc.Vec, t: float) -> Step:
         """Newton's step, from ``moved`` and ``t`` off where the section is."""
@@ -446,8 +450,8 @@ class SingularSystem:
         (z, *V), border = self._bordered[0].solve([-at.y])
         z, bend = combine([z, *V], np.array([1.0, *(at.N @ self.rest(at.N, at.G, -border[:, 0]))])), 0.0
         for step, weight in SHARP:
-            matrix = self._matrix(x + null * (step * WIDE), t, moved=True).matrix
-            bend += weight / (step * WIDE**2) * self.image(matrix, null).dot(null)
+            image, _ = self.images(x + null * (step * WIDE), [null], t)
+            bend += weight / (step * WIDE**2) * image.dot(null)
         self._matrix(x, t)
         return bend + 3 * z.dot(at.y)
 

@@ -36,12 +36,10 @@ INSENSITIVE, ROUNDED = 1e-10, 10.0 * EPS
 
 def coupling_of(solver: BranchSolver, x: PETSc.Vec, null_vector: PETSc.Vec) -> float:
     """Cosine between a null vector and ``F_lam``, the derivative in the load at ``x``, the same in all units."""
-    system = solver.system
-    matrix = system.at(x).jacobian(solver.axis)
-    derivative = matrix * solver.axis
-    system.set_load(derivative, 0.0)
+    system, found = solver.system, solver.inertia.at(x)
+    derivative = found.border.copy()
     # by a load of natural size; of a trivial state the equations do not feel it
-    least = max(INSENSITIVE * system.stiffness_scale, ROUNDED * system.matrix_in_units(matrix).norm())
+    least = max(INSENSITIVE * system.stiffness_scale, ROUNDED * system.matrix_in_units(found.matrix).norm())
     if system.in_units(derivative, 1).norm() * solver.units.load < least:
         return 0.0
     force, motion = derivative.duplicate(), null_vector.duplicate()

@@ -19,6 +19,7 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.motion_names import names_for
 from rodfem.stability.near_zero import resolve
 
+SHARE = 8  # of the points of a composite rule, where few do
 ROWS = 4  # rows one after the other that have as many zero eigenvalues, before these are said to stay
 
 
@@ -87,26 +88,24 @@ class Quadrature:
         """Take the bars of points away where the equations are not integrated, mark rows on a kink, and say so."""
         first = branch.points[: branch.parent is None]
         asked = [s for s in branch.special if isfinite(s.error_estimate) or s.kind == END]
-        found = self._reasons(first, asked)
+        found = [(s.point, self._without_bars(s, branch)) for s in asked if s.resolved is not False]
         self._kinks(branch, [*first, *(special.point for special in asked)])
         self._say(branch, [(point, words) for point, words in found if words and not point.kink])
         none = "the ordinate is not a finite number, and perhaps at other loads: return one at every state."
         self._say(branch, [(point, none) for point in branch.points if not isfinite(point.ordinate)])
-
-    def _reasons(self, first: Sequence[Point], asked: Sequence[SpecialPoint]) -> list[tuple[Point, str]]:
-        """Why the equations are not integrated at the points of a branch; empty where they are."""
-        found = [(point, self._on(point.mesh)(point.x)) for point in first]
-        return found + [(s.point, self._without_bars(s)) for s in asked if s.resolved is not False]
 
     def _say(self, branch: Branch, found: Sequence[tuple[Point, str]]) -> None:
         """Say the first thing that was found."""
         for point, words in found[:1]:
             self.observer.warn(Remark(f"{branch.name}: at {self.load} = {point.load:.6g} {words}", point.load))
 
-    def _without_bars(self, special: SpecialPoint) -> str:
-        """Take the bars of a special point away where the equations are not integrated, and say why."""
+    def _without_bars(self, special: SpecialPoint, branch: Branch) -> str:
+        """Take the bars of a special point away where the equations are not integrated, and say why.
+
+        What varies along the rod is felt at the end of a branch that left no other: few points do for all else.
+        """
         point = special.point
-        if words := self._on(point.mesh)(point.x):
+        if words := self._on(point.mesh)(point.x, 1 if branch.parent is None and special.kind == END else SHARE):
             special.error_estimate = special.ordinate_error = point.estimate = special.omega2_error = nan
             special.resolved = None
             special.note = "; ".join(filter(None, (special.note, "not estimated: see the warnings")))

@@ -21,7 +21,7 @@ from rodfem.adaptivity.mesh_sequence import Meshes, interpolated
 from rodfem.continuation.arc import Piece
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.crossings import Node, Zeros, fourth
+from rodfem.continuation.crossings import Node, Zeros, clear, fourth, off
 from rodfem.continuation.kinds import IMPERFECT
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.continuation.singular import SingularState, SingularSystem
@@ -160,7 +160,7 @@ class SpecialSearch:
         """
         piece, p, q = self._ends(a, b, self._prepare(a))
         worst = max((p.kept.reduced, q.kept.reduced), key=lambda found: found.rotated)
-        if p.far != q.far or worst.rotated >= ROTATED:
+        if worst.rotated >= ROTATED:
             piece, p, q = self._ends(a, b, self._border(self._condensation(b.mesh).improved(worst)))
         for halvings in HALVINGS:
             if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) < ROTATED:
@@ -273,9 +273,11 @@ class SpecialSearch:
 
     def _fourth(self, piece: Piece, p: Node, q: Node) -> np.ndarray:
         """Size of the fourth derivative in a piece, by the row before it."""
-        row = self._before
+        row, size = self._before, fourth(p, q, None)
         if row is None or row.mesh != self._made[0] or row.tangent is None:
-            return fourth(p, q, None)
+            return size
+        if id(row) not in self._known and clear(p, q, off(p, q, size)):  # of another border
+            return size
         before = piece.node(row.x, row.tangent, self._reduced(row))
         return fourth(p, q, before if before.s < p.s else None)
 
@@ -287,6 +289,8 @@ class SpecialSearch:
         An eigenvalue touches zero there.
         """
         (p, q), solver = ends, piece.solver
+        if p.index != q.index and is_fold(solver, (at := of_turn(piece, p, q, s)).x, at.null):
+            return None
         margin = ASIDE * (q.s - p.s)
         left, right = (
             piece.solve(p, q, max(s - margin, (p.s + s) / 2)),

@@ -12,6 +12,7 @@
 #include <string.h>
 
 #define PUBLIC static /* called from Python */
+#define WIDTH 8 /* columns that are multiplied at once */
 
 typedef void kernel(double *, const double *, const double *, const double *, const int *, const uint8_t *);
 typedef void custom_kernel(double *, const double *, const double *, const double *, const int *, const uint8_t *, void *);
@@ -72,42 +73,51 @@ static void lay(const Form *form, const double *u)
     }
 }
 
-/* Add the form for the values u to out.  Returns 1 where an interior facet couples more than the cell of its first side,
-   which no place is for.  */
-PUBLIC int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out)
+/* The element tensor of the form at an entity of an integral, for the values u.  Returns NULL where an interior facet
+   couples more than the cell of its first side, which no place is for.  */
+static const double *tensor_of(const Form *form, const Integral *integral, const int *entity, const double *u,
+                               const double *constants)
 {
     const uint8_t permutations[2] = {0, 0};
+    int n = form->size, known = form->tables + form->pieces, sides = integral->kind == 4 ? 2 : 1, m = sides * n;
+    int facets[2] = {integral->kind > 1 ? entity[1] : 0, integral->kind == 4 ? entity[3] : 0};
+    size_t entries = form->rank == 0 ? 1 : form->rank == 1 ? (size_t)m : (size_t)m * m;
+    double coordinates[12], *a = form->tensor;
+    for (int side = 0; side < sides; side++) {
+        int cell = entity[2 * side];
+        const int *dofs = form->dofs + (size_t)cell * n;
+        double *to = form->w + sides * form->own + side * known;
+        for (int i = 0; i < form->own; i++) form->w[side * n + i] = u[dofs[i]];
+        memcpy(to, form->table + (size_t)cell * form->tables, form->tables * sizeof(double));
+        memcpy(to + form->tables, form->piece, form->pieces * sizeof(double));
+        memcpy(coordinates + 6 * side, form->x + (size_t)cell * 6, 6 * sizeof(double));
+    }
+    memset(a, 0, entries * sizeof(double));
+    if (integral->custom)
+        ((custom_kernel *)integral->kernel)(a, form->w, constants, coordinates, facets, permutations, NULL);
+    else
+        ((kernel *)integral->kernel)(a, form->w, constants, coordinates, facets, permutations);
+    for (size_t i = n; form->rank > 0 && sides == 2 && i < entries; i++)
+        if (a[i] != 0 && (form->rank == 1 || i / m >= (size_t)n || i % m >= (size_t)n)) return NULL;
+    return a;
+}
+
+/* Add the form for the values u to out.  Returns 1 where no place is for a part of it.  */
+PUBLIC int assemble(const Form *form, const Places *places, const double *u, const double *constants, double *out)
+{
+    int n = form->size;
     assembled++;
-    int n = form->size, known = form->tables + form->pieces;
-    double coordinates[12];
     lay(form, u);
     for (int k = 0; k < form->integrals; k++) {
         const Integral *integral = &form->integral[k];
-        int sides = integral->kind == 4 ? 2 : 1, m = sides * n;
-        size_t entries = form->rank == 0 ? 1 : form->rank == 1 ? (size_t)m : (size_t)m * m;
+        int m = integral->kind == 4 ? 2 * n : n;
         for (int e = 0; e < integral->count; e++) {
             const int *entity = integral->entities + (size_t)e * integral->kind;
-            int facets[2] = {integral->kind > 1 ? entity[1] : 0, integral->kind == 4 ? entity[3] : 0};
-            for (int side = 0; side < sides; side++) {
-                int cell = entity[2 * side];
-                const int *dofs = form->dofs + (size_t)cell * n;
-                double *to = form->w + sides * form->own + side * known;
-                for (int i = 0; i < form->own; i++) form->w[side * n + i] = u[dofs[i]];
-                memcpy(to, form->table + (size_t)cell * form->tables, form->tables * sizeof(double));
-                memcpy(to + form->tables, form->piece, form->pieces * sizeof(double));
-                memcpy(coordinates + 6 * side, form->x + (size_t)cell * 6, 6 * sizeof(double));
-            }
-            double *a = form->tensor;
-            memset(a, 0, entries * sizeof(double));
-            if (integral->custom)
-                ((custom_kernel *)integral->kernel)(a, form->w, constants, coordinates, facets, permutations, NULL);
-            else
-                ((kernel *)integral->kernel)(a, form->w, constants, coordinates, facets, permutations);
+            const double *a = tensor_of(form, integral, entity, u, constants);
+            if (!a) return 1;
             if (form->rank == 0) { out[0] += a[0]; continue; }
             size_t cell = entity[0];
             const int *row = places->row + cell * n;
-            for (size_t i = n; sides == 2 && i < entries; i++)
-                if (a[i] != 0 && (form->rank == 1 || i / m >= (size_t)n || i % m >= (size_t)n)) return 1;
             if (form->rank == 1) {
                 for (int i = 0; i < n; i++) if (row[i] >= 0) out[row[i]] += a[i];
                 continue;
@@ -119,6 +129,41 @@ PUBLIC int assemble(const Form *form, const Places *places, const double *u, con
                 const double *from = a + (size_t)i * m;
                 double *to = out + row[i];
                 for (int j = 0; j < n; j++) if (offset[j] >= 0) to[offset[j]] += from[j];
+            }
+        }
+    }
+    return 0;
+}
+
+/* Add the products of the bilinear form, or of its transpose, with the `count` columns of x to those of out.  Unknowns
+   have the number[] of their local degree of freedom; -1: always zero.  Returns 1 where no place is for a part of it.  */
+PUBLIC int multiply(const Form *form, const int *number, const double *u, const double *constants, int transposed,
+                    int count, const double *x, double *out)
+{
+    int n = form->size;
+    double given[n][WIDTH];
+    lay(form, u);
+    for (int k = 0; k < form->integrals; k++) {
+        const Integral *integral = &form->integral[k];
+        int m = integral->kind == 4 ? 2 * n : n, along = transposed ? 1 : m, across = transposed ? m : 1;
+        for (int e = 0; e < integral->count; e++) {
+            const int *entity = integral->entities + (size_t)e * integral->kind;
+            const int *dofs = form->dofs + (size_t)entity[0] * n;
+            const double *a = tensor_of(form, integral, entity, u, constants);
+            if (!a) return 1;
+            for (int first = 0; first < count; first += WIDTH) {
+                int wide = count - first < WIDTH ? count - first : WIDTH;
+                memset(given, 0, sizeof given);
+                for (int j = 0; j < n; j++)
+                    if (number[dofs[j]] >= 0)
+                        memcpy(given[j], x + (size_t)number[dofs[j]] * count + first, wide * sizeof(double));
+                for (int i = 0; i < n; i++) {
+                    if (number[dofs[i]] < 0) continue;
+                    double sum[WIDTH] = {0}, *to = out + (size_t)number[dofs[i]] * count + first;
+                    for (int j = 0; j < n; j++)
+                        for (int q = 0; q < WIDTH; q++) sum[q] += a[i * along + j * across] * given[j][q];
+                    for (int q = 0; q < wide; q++) to[q] += sum[q];
+                }
             }
         }
     }

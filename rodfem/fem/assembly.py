@@ -15,12 +15,15 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.linalg.compiled import Memory, buffer, module
+from rodfem.linalg.compiled import Memory, addresses, buffer, module
 from rodfem.linalg.matrices import shared_matrix
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
     from rodfem.fem.known import TableFunctions
+
+
+ONE_CELL = "A term at a point inside the rod must be evaluated in one of the two cells there."
 
 
 class Places:
@@ -85,7 +88,8 @@ class Assembler:
 
     It is assembled on the ``cells`` of this rank, or with ``inside`` its integrals over any ``cells``; ``load`` is the
     local degree of freedom of the load.  ``constants`` are those of the form, as :meth:`pack_constants` found them;
-    ``pointer`` and ``function`` are the form, and the address of what assembles it, for other compiled code.
+    ``pointer`` and ``functions`` are the form, and the addresses of what assembles it and multiplies with it, for other
+    compiled code.
     """
 
     def __init__(self, form: Any, cells: Cells, known: TableFunctions, load: int, *, inside: bool = False) -> None:
@@ -120,7 +124,7 @@ class Assembler:
         numbers = {"rank": form.rank, "size": size, "own": size * (names != [known.name]), "integrals": len(integrals)}
         numbers |= {"integral": held, "tables": tables, "paths": len(known.rows), "pieces": pieces, "path": paths}
         self.pointer = ffi.new("Form *", numbers | pointers)
-        self.function = int(ffi.cast("uintptr_t", ffi.addressof(self._code.lib, "assemble")))
+        self.functions = addresses(self._code, "assemble", "multiply")
         self.constants = np.zeros(0)
 
     def pack_constants(self) -> None:
@@ -133,7 +137,7 @@ class Assembler:
         target = ffi.NULL if places is None else places.pointer
         given = (buffer(ffi, x) for x in (values, self.constants, out))
         failed = self._code.lib.assemble(self.pointer, target, *given)
-        assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."
+        assert not failed, ONE_CELL
 
 
 def bordered_pattern(fields: Fields) -> sp.csr_matrix:

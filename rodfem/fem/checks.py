@@ -209,9 +209,13 @@ class QuadratureCheck:
         names = (system.fields.turning.name, "v", "r")
         self._rows = {name: self._pieces.rows[name].ravel() for name in names if name in system.fields.dofs}
 
-    def __call__(self, x: PETSc.Vec) -> str:
-        """Return a clause on where the equations are not integrated in a state ``x``; empty for nowhere."""
-        state, elements, number = self.system.at(x), self.system.fields.discretization.elements, self._pieces.number
+    def __call__(self, x: PETSc.Vec, share: int = 1) -> str:
+        """Return a clause on where the equations are not integrated in a state ``x``; empty for nowhere.
+
+        The composite rule has a ``share`` of its points where functions of arclength are known to be integrated.
+        """
+        state, elements = self.system.at(x), self.system.fields.discretization.elements
+        number = max(LEAST, self._pieces.number // share)
         self.system.equations.take(state.line)
         values = [local[self._pieces.dofs] for local in (state.local, self._moved(state.local))]
         *coarse, fine = np.split(self._terms(values, 1, 2, 3, number), np.cumsum([1, 2, 3]), axis=1)
@@ -232,6 +236,8 @@ class QuadratureCheck:
                     found.append((errors[cell], self._place(values, term, cell, rows, parts, least[term])))
         if not (every := [each for part in self.system.comm.allgather(found) for each in part]):
             return ""
+        if share > 1:
+            return self(x)
         _, (a, b, low, high) = max(every)
         return (
             f"the quadrature of the element from {a:.6g} to {b:.6g} does not integrate the equations about s = "

@@ -11,11 +11,12 @@
 #define PUBLIC static /* called from Python */
 
 typedef int assemble_form(const void *, const void *, const double *, const double *, double *);
+typedef int multiply_form(const void *, const int *, const double *, const double *, int, int, const double *, double *);
 typedef int factor_matrix(void *, const double *);
 typedef int solve_columns(const void *, int, const double *, double *);
 
 typedef struct {
-    uintptr_t assemble, factor, solve; /* functions of the modules that assemble and factor */
+    uintptr_t assemble, multiply, factor, solve; /* functions of the modules that assemble and factor */
     const void *residual, *equation_places, *jacobian, *entry_places;
     const double *residual_constants, *jacobian_constants;
     void *factors;
@@ -124,6 +125,29 @@ PUBLIC int assemble_at(const Rod *rod, const double *x)
         rod->values[rod->load_column[i]] = 0;
     }
     rod->values[rod->load_diagonal] = 1;
+    return 0;
+}
+
+/* Products of (S F_lam) at x, or of its transpose, with the `count` columns of a change; the row of the load is zero.  */
+PUBLIC int multiply_at(const Rod *rod, const double *x, int transposed, int count, const double *change, double *out)
+{
+    memset(out, 0, (size_t)rod->n * count * sizeof(double));
+    gather(rod, x);
+    if (((multiply_form *)rod->multiply)(rod->jacobian, rod->number, rod->u, rod->jacobian_constants, transposed, count,
+                                         change, out)) return 1;
+    for (int d = 0; d < rod->drifts; d++) {
+        const double *condition = rod->conditions + (size_t)d * rod->n, *force = rod->forces + (size_t)d * rod->n;
+        const double *row = transposed ? force : condition, *column = transposed ? condition : force;
+        size_t at = (size_t)rod->drift[d] * count;
+        for (int q = 0; q < count; q++) {
+            if (!rod->active[d]) { out[at + q] += change[at + q]; continue; }
+            for (int i = 0; i < rod->n; i++) {
+                out[at + q] += row[i] * change[(size_t)i * count + q];
+                out[(size_t)i * count + q] += column[i] * change[at + q];
+            }
+        }
+    }
+    memset(out + (size_t)rod->load * count, 0, count * sizeof(double));
     return 0;
 }
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.fem.assembly import ONE_CELL
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.compiled import Memory, buffer, module
 from rodfem.linalg.matrices import EPS, shared
@@ -331,15 +332,25 @@ class CompiledNewton:
         }
         for name, owner in owners.items():
             setattr(rod, name, keep((rod, name), owner).pointer)
-        rod.assemble = residual.function
+        rod.assemble, rod.multiply = residual.functions
         rod.factor, rod.solve = self.factors.functions
 
     def assemble(self, x: PETSc.Vec) -> None:
         """Fill the matrix with ``S`` at ``x`` and a one for the load, and :attr:`border`; phase conditions stay."""
         self.take()
         failed = self.lib.assemble_at(self.rod, buffer(self.ffi, x.array_r))
-        assert not failed, "A term at a point inside the rod must be evaluated in one of the two cells there."
+        assert not failed, ONE_CELL
         self.matrix.stateIncrease()
+
+    def images(self, x: PETSc.Vec, own: np.ndarray, *, transposed: bool) -> np.ndarray:
+        """Products of ``(S F_lam)`` at ``x``, or of its transpose, with the columns of ``own`` (n, k)."""
+        self.take()
+        own = np.ascontiguousarray(own)
+        out = np.empty_like(own)
+        given = (buffer(self.ffi, each) for each in (own, out))
+        failed = self.lib.multiply_at(self.rod, buffer(self.ffi, x.array_r), transposed, own.shape[1], *given)
+        assert not failed, ONE_CELL
+        return out
 
     def iterate(self, x: PETSc.Vec, row: PETSc.Vec, fresh: bool) -> tuple[int, float, float]:
         """Move ``x`` by one correction on the plane across ``row``, with factors of the Jacobian there if ``fresh``.

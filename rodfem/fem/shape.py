@@ -68,7 +68,8 @@ class Shape:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
 
         It is sought where the derivative of the polynomial vanishes, in each element whose least value at many points
-        is above that of the rod by less than a change between neighbours.
+        is above that of the rod by less than a quarter of a second difference: a parabola falls half of that between
+        two neighbours.
         """
         if 2 not in self.system.scene.free_strains:
             return 1.0
@@ -76,7 +77,7 @@ class Shape:
         samples = nodal @ self._v_at_samples.T
         lowest, comm = samples.min(axis=1), self.system.comm
         least = comm.allreduce(float(lowest.min()), op=MPI.MIN)
-        near = lowest - least < abs(np.diff(samples)).max(axis=1)
+        near = lowest - least < abs(np.diff(samples, 2)).max(axis=1) / 4
         curves = map(Polynomial, nodal[near] @ self._v_to_powers.T)
         inside = [p(np.clip(p.deriv().roots().real, -1.0, 1.0)) for p in curves]
         return float(comm.allreduce(min([least, *np.concatenate([*inside, []]).tolist()]), op=MPI.MIN))

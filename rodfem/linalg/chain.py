@@ -17,7 +17,7 @@ from petsc4py import PETSc
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from rodfem.errors import ConvergenceError
-from rodfem.linalg.compiled import buffer, module
+from rodfem.linalg.compiled import addresses, buffer, module
 from rodfem.linalg.factorization import Factors, Mumps, Sizes
 from rodfem.linalg.matrices import Shared, shared
 
@@ -108,8 +108,7 @@ class Chain:
     @property
     def functions(self) -> list[int]:
         """Addresses of the functions that factor and solve."""
-        found = (self.ffi.addressof(self.lib, name) for name in ("chain_factor", "chain_solve"))
-        return [int(self.ffi.cast("uintptr_t", address)) for address in found]
+        return addresses(module("linalg/chain"), "chain_factor", "chain_solve")
 
     def __call__(self, matrix: PETSc.Mat) -> None:
         """Factor ``matrix``; raises :class:`ConvergenceError` for one that is no chain, or has no numbers in it."""

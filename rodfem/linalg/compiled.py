@@ -77,6 +77,11 @@ def buffer(ffi: Any, values: np.ndarray) -> Any:
     return ffi.from_buffer(kind, values if values.flags.c_contiguous else values.T)
 
 
+def addresses(compiled: Any, *names: str) -> list[int]:
+    """Addresses of functions of a compiled module, for other compiled code."""
+    return [int(compiled.ffi.cast("uintptr_t", compiled.ffi.addressof(compiled.lib, name))) for name in names]
+
+
 @cache
 def module(name: str) -> Any:
     """The compiled module of the file ``name.c`` in the package, with ``lib`` and ``ffi`` of cffi."""

@@ -68,7 +68,8 @@ class Inertia:
 
     Eigenvalues ``mu`` are relative to the system's metric.  ``tolerance`` is the half width of what counts as zero, the
     larger of 1e-7 of the rod's lowest bending eigenvalue and of ``resolution``, the band of round-off.
-    ``vectors`` are those that :meth:`Factored.nearest` found last.
+    ``vectors`` are those that :meth:`Factored.nearest` found last, and the columns of ``edge`` (own rows, k) the border
+    of a branch: the metric times modes near zero, with which :meth:`Factored.solutions` are made as well.
     """
 
     def __init__(self, system: System) -> None:
@@ -87,6 +88,8 @@ class Inertia:
         self.constraints, self.scale = fields.constraints(), system.stiffness_scale
         self.tolerance, self.resolution = ZERO_BAND * self.scale, 0.0
         self.vectors: list[PETSc.Vec] = []
+        self.edge = np.zeros((self.border.local_size, 0))
+        self.relaxed = 0, self.edge, self.edge  # of which matrix, for which border, and the solutions
         self.shift, self.filled, self.factored = 0.0, 0, 0
         self.bordered: dict[int, Any] = {}  # see rodfem.stability.reduced_stiffness
         self._held: tuple[State, Phase, int] | None = None
@@ -106,11 +109,30 @@ class Inertia:
         held, phase, changes = self._held or (None, None, 0)
         return held is state and phase is self.system.phase and changes == self.matrix.stateGet()
 
-    def moved(self, x: PETSc.Vec) -> Factored:
-        """Assemble ``S`` at ``x`` near the last state, whose phase conditions stay: for a difference."""
+    def images(self, x: PETSc.Vec, own: np.ndarray, *, transposed: bool = False) -> np.ndarray:
+        """Products of ``(S F_lam)`` near the last state, at ``x``, or of its transpose, with columns (own rows, k).
+
+        Phase conditions stay, and so do the matrix and its factors, if code is compiled.  The row of the load is zero.
+        """
+        if self.compiled is not None:
+            with self.system.clock("assembly"):
+                return self.compiled.images(x, own, transposed=transposed)
         self._assemble(x, self.system.at(x))
         self.filled += 1
-        return Factored(self)
+        out = np.empty_like(own)
+        for column, image in zip(own.T, out.T, strict=True):
+            change, product = self.system.new_vector(column), self.system.new_vector()
+            load = self.system.scalar(change)
+            self.system.set_load(change, 0.0)
+            (self.matrix.multTranspose if transposed else self.matrix.mult)(change, product)
+            product.axpy(load, self.border)
+            self.system.set_load(product, 0.0)
+            image[:] = product.array_r.real
+        return out
+
+    def force(self, x: PETSc.Vec) -> PETSc.Vec:
+        """Derivative of the equations in the load at ``x``."""
+        return self.system.new_vector(self.images(x, self._axis.array_r[:, None])[:, 0])
 
     def _assemble(self, x: PETSc.Vec, state: State) -> None:
         with self.system.clock("assembly"):
@@ -286,6 +308,18 @@ class Factored:
                 own.factors(own.matrix)
                 own.factored = self._filled
         return own.counted(own.factors, own.shift, self.drifts)
+
+    def solutions(self, right: np.ndarray) -> np.ndarray:
+        """Solutions for the columns of ``right`` (own rows, k), and for those of the inertia's border."""
+        own = self._own()
+        out = self.factors.solve_all(np.hstack([right, own.edge]))
+        own.relaxed = self._filled, own.edge, out[:, right.shape[1] :]
+        return out
+
+    def relaxed(self, edge: np.ndarray) -> np.ndarray:
+        """Solutions for the columns of a border, which are known if it is that of the inertia."""
+        filled, known, out = self._own().relaxed
+        return out if filled == self._filled and known is edge else self.factors.solve_all(edge)
 
     def count(self) -> Index:
         """Index; two factorisations, the last of which serves :meth:`nearest`."""

@@ -40,7 +40,7 @@ SOFT = 1e-6
 """Eigenvalue of H, over the lowest bending one, below which it may be round-off."""
 DIFFERENCE, AHEAD = 1e-4, 1e-6
 """Distances of the states whose matrices are differenced, in the metric: on both sides, and ahead alone."""
-ROTATED = 1.0
+ROTATED = 3.0
 """Size of ``W^t M W - 1`` above which a border has become that of other modes."""
 
 
@@ -54,12 +54,18 @@ class Bordered:
         self.system, self.k, self.constraints = system, borders, constraints
         self.comm, self.n, fields = system.comm, system.fields.unknowns, system.fields
         self.extra = borders if system.has_scalars else 0  # rows of the borders on this rank, the last one
-        inner, along = local_rows(matrix).copy(), self.n + borders
-        inner.data[:] = 1.0
-        above = sp.hstack([inner, np.ones((inner.shape[0], borders))], format="csr")
-        pattern = sp.vstack([above, np.ones((self.extra, along))], format="csr")
-        pattern.indptr, pattern.indices = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
-        self.own, self._border, self._rows = above.nnz, above.indices >= self.n, pattern
+        inner, along = local_rows(matrix), self.n + borders
+        rows, last = inner.shape[0], np.arange(self.n, along)
+        counts = np.append(np.diff(inner.indptr) + borders, np.full(self.extra, along))
+        indices = np.empty(counts.sum(), dtype=PETSc.IntType)
+        indptr = np.append(0, np.cumsum(counts)).astype(PETSc.IntType)
+        ends = (indptr[1 : rows + 1, None] - borders + np.arange(borders)).ravel()
+        field = np.ones(indptr[rows], dtype=bool)
+        field[ends] = False
+        indices[: indptr[rows]][field], indices[ends] = inner.indices, np.tile(last, rows)
+        indices[indptr[rows] :] = np.tile(np.arange(along), self.extra)
+        pattern = sp.csr_matrix((np.ones(len(indices)), indices, indptr), (rows + self.extra, along))
+        self.own, self._border, self._rows = int(indptr[rows]), ~field, pattern
         if fields.compiled:
             self.matrix = shared_matrix(self.comm, pattern)
             self._rows = local_rows(self.matrix)
@@ -165,7 +171,7 @@ class Condensation:
         """Reduced stiffness matrix at an equilibrium ``x`` with its unit ``tangent``, for a border ``phi``."""
         inertia, found, B = self.inertia, self.inertia.at(x), self._weighed(phi)
         try:
-            below, Z = found.eigenvalue_count(0.0), found.factors.solve_all(B)
+            below, Z = found.eigenvalue_count(0.0), found.relaxed(B)
             H, (values, vectors) = self._condensed(B, Z)
             if abs(values).min() < DOUBTFUL * inertia.scale:  # it may touch zero
                 Z = Z + found.factors.solve_all(B - inertia.times(Z))
@@ -189,7 +195,8 @@ class Condensation:
         """Metric times a border, which serves for many states."""
         if self._last is None or self._last[0] is not phi:
             self._last = phi, self.inertia.weighed(phi)
-        return self._last[1]
+        self.inertia.edge = self._last[1]
+        return self.inertia.edge
 
     def _condensed(self, B: np.ndarray, Z: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
         """H with its eigenvalues and vectors."""
@@ -215,11 +222,9 @@ class Condensation:
         behind, length = x, AHEAD
         if central:
             behind, length = x - tangent * DIFFERENCE, 2 * DIFFERENCE
-            inertia.moved(behind)
-            H = inertia.sum(W.T @ inertia.times(W))
+            H = inertia.sum(W.T @ inertia.images(behind, W))
         ahead = behind + tangent * length
-        inertia.moved(ahead)
-        out = (inertia.sum(W.T @ inertia.times(W)) - H) / length
+        out = (inertia.sum(W.T @ inertia.images(ahead, W)) - H) / length
         phase = system.phase
         if phase.rows:
             rates = (system.at(ahead).generators - system.at(behind).generators) / length

@@ -56,7 +56,6 @@ def test_near_singular_states_are_left_to_others(name: str) -> None:
     assert len(special) > 2
     for s in special:
         follower.system.set_phase(s.point.x)
-        follower.regular.restart()
         assert follower.regular.at(s.point.x) is None
         found = follower.inertia.at(s.point.x)
         found.count()
