@@ -10,18 +10,7 @@ import pytest
 from classics import ON_AXIS, column, explore, push
 from closed_form_hemitropic import loads as buckling_loads
 
-from rodfem import (
-    Discretization,
-    Ordinate,
-    Plan,
-    Scene,
-    StepControl,
-    clamped,
-    free,
-    pinned,
-    sliding,
-    trace,
-)
+from rodfem import Discretization, Ordinate, Plan, Scene, StepControl, clamped, free, pinned, sliding, trace
 from rodfem.continuation.branch import breaks, merge_doubles
 from rodfem.continuation.follow import follow
 from rodfem.continuation.kinds import BRANCH_POINT

@@ -9,17 +9,7 @@ import pytest
 from classics import column
 
 import rodfem
-from rodfem import (
-    Attachment,
-    Discretization,
-    Drag,
-    Event,
-    Inertia,
-    Plan,
-    Scene,
-    clamped,
-    free,
-)
+from rodfem import Attachment, Discretization, Drag, Event, Inertia, Plan, Scene, clamped, free
 from rodfem.continuation.kinds import EVENT
 from rodfem.errors import InputError
 from rodfem.fem.fingerprint import fingerprint, same

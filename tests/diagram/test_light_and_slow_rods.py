@@ -17,19 +17,7 @@ from hard.thrusts import THIN
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from rodfem import (
-    Attachment,
-    Diagram,
-    Discretization,
-    End,
-    Inertia,
-    Ordinate,
-    Plan,
-    Scene,
-    clamped,
-    free,
-    trace,
-)
+from rodfem import Attachment, Diagram, Discretization, End, Inertia, Ordinate, Plan, Scene, clamped, free, trace
 from rodfem.codim2.follow import NEAREST
 from rodfem.continuation.kinds import END
 from rodfem.forms import loads

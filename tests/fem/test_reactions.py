@@ -17,19 +17,7 @@ from problem.test_docs import scenes
 from scipy.special import ellipe, ellipk
 
 import rodfem
-from rodfem import (
-    Attachment,
-    Discretization,
-    Ordinate,
-    Plan,
-    Scene,
-    Solver,
-    clamped,
-    elastic,
-    free,
-    hinged,
-    pinned,
-)
+from rodfem import Attachment, Discretization, Ordinate, Plan, Scene, Solver, clamped, elastic, free, hinged, pinned
 from rodfem.forms.energy import bending_and_twist, hemitropic
 from rodfem.output.states import Profiles, to_csv
 from rodfem.problem.quaternions import directors

@@ -13,20 +13,7 @@ from scipy.linalg import eigvalsh, expm
 from scipy.optimize import brentq, root
 
 import rodfem
-from rodfem import (
-    Attachment,
-    Discretization,
-    End,
-    Ordinate,
-    Plan,
-    Solver,
-    at,
-    clamped,
-    everywhere,
-    free,
-    pinned,
-    sliding,
-)
+from rodfem import Attachment, Discretization, End, Ordinate, Plan, at, clamped, everywhere, free, pinned, sliding
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 
@@ -53,7 +40,7 @@ def test_rotating_cantilever() -> None:
         "blade", (clamped(), free()), (0.0, 144.0), inertia=BEAM, constants={"B1": 50.0, "B2": 1.0, "C": 50.0},
         potential=lambda x, c: -c.P / 2 * (x.r[1] ** 2 + x.r[2] ** 2),
     )  # fmt: skip
-    solver = Solver(rod)
+    solver = rodfem.Solver(rod)
     verdict = solver.assess(solver.equilibrium(144.0), number=4)
     assert (verdict.negative, verdict.zero) == (0, 0)
     assert verdict.values[:4] == pytest.approx(expected, rel=1e-8)

@@ -12,18 +12,7 @@ from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
 import rodfem
-from rodfem import (
-    Attachment,
-    Discretization,
-    End,
-    Inertia,
-    Plan,
-    Ring,
-    Scene,
-    SceneError,
-    Solver,
-    free,
-)
+from rodfem import Attachment, Discretization, End, Inertia, Plan, Ring, Scene, SceneError, Solver, free
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.modes.finder import ModeFinder

@@ -7,27 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
-from classics import BEAM, ON_AXIS, RIGID, circle, column, push
+from classics import BEAM, ON_AXIS, circle, column, push
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigvalsh, null_space
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipj, ellipk
 
 import rodfem
-from rodfem import (
-    Discretization,
-    Ordinate,
-    Parameter,
-    Plan,
-    Ring,
-    Scene,
-    Solver,
-    clamped,
-    everywhere,
-    free,
-    pinned,
-    sliding,
-)
+from rodfem import Discretization, Ordinate, Plan, Ring, Scene, Solver, clamped, everywhere, free, pinned, sliding
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability import METHODS
 
@@ -37,17 +24,14 @@ B, C = 1.0, 0.7
 
 def ring(turns: int, load: str, span: tuple[float, float], **more: Any) -> Scene:
     """A rod of natural curvature k0 closed to a circle of radius one that it covers several times."""
-    values = {"k0": 1.0, "C": C} | {load: span[0]}
     given: dict[str, Any] = {
         "energy": lambda v, k, c: bending_and_twist((k[0], k[1] - c.k0, k[2]), (B, B, c.C)),
-        "parameters": {name: Parameter(value) for name, value in values.items()},
         "ordinate": Ordinate("width", s=pi, of=lambda r, q: hypot(*r)),
-        "ends": Ring(odd=turns % 2 == 1),
-        "start": circle,
     }
-    return Scene(
-        name="ring", interval=(0.0, 2 * pi * turns), rod=RIGID, load=load, span=span, **given | more,
-    )  # type: ignore[arg-type]  # fmt: skip
+    return column(
+        "ring", more.pop("ends", Ring(odd=turns % 2 == 1)), span, interval=(0.0, 2 * pi * turns), load=load,
+        constants={"k0": 1.0, "C": C} | {load: span[0]}, **{"start": circle} | given | more,
+    )  # fmt: skip
 
 
 @pytest.mark.long

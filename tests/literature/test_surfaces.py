@@ -9,18 +9,7 @@ import ufl
 from classics import column
 
 import rodfem
-from rodfem import (
-    Discretization,
-    Ordinate,
-    Plan,
-    clamped,
-    everywhere,
-    free,
-    hinged,
-    pinned,
-    sliding,
-    tabulated,
-)
+from rodfem import Discretization, Ordinate, Plan, clamped, everywhere, free, hinged, pinned, sliding, tabulated
 
 pytestmark = pytest.mark.ranks
 

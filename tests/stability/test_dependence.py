@@ -6,17 +6,7 @@ import numpy as np
 import pytest
 from classics import column
 
-from rodfem import (
-    Discretization,
-    Ordinate,
-    Plan,
-    Scene,
-    Solver,
-    StepControl,
-    clamped,
-    pinned,
-    trace,
-)
+from rodfem import Discretization, Ordinate, Plan, Scene, Solver, StepControl, clamped, pinned, trace
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import SceneError

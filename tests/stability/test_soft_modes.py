@@ -14,20 +14,7 @@ from classics import SUPPORTS, column, push
 from continuation.test_index_chain import localised
 from mpi4py import MPI
 
-from rodfem import (
-    Diagram,
-    Discretization,
-    Ordinate,
-    Plan,
-    Scene,
-    Solver,
-    clamped,
-    free,
-    load,
-    pinned,
-    sliding,
-    trace,
-)
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, Solver, clamped, free, load, pinned, sliding, trace
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.app.terminal import Report
 from rodfem.forms import loads
