@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import rodfem
@@ -47,6 +48,12 @@ nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 suppress_warnings = ["myst-nb.lexer"]  # lessons that are not executed name no language
+
+KERNEL = TemporaryDirectory()  # of the lessons' kernels, which warn of a connection that nobody else hears
+profile = Path(KERNEL.name) / "profile_default"
+profile.mkdir()
+(profile / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n")
+os.environ["IPYTHONDIR"] = KERNEL.name
 
 autodoc_typehints = "none"
 autodoc_preserve_defaults = True
