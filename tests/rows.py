@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rodfem.continuation.branch import Branch
+from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD
 from rodfem.stability.assessment import Assessor
@@ -32,3 +32,8 @@ def verify(follower: BranchSolver, branches: Sequence[Branch], explained: bool =
                 before, after = special[id(point)].negative_before, special[id(point)].negative_after
                 assert point.negative <= min(before, after), f"{branch.name}, row {row}"
         assert not (explained and branch.unexplained), [str(u) for u in branch.unexplained]
+
+
+def regular(branch: Branch) -> list[Point]:
+    """Rows that a branch has been followed by: without its special points."""
+    return [p for p in branch.points if not any(p is s.point for s in branch.special)]

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 import reference_values
 from closed_forms import elastica
-from mpi4py import MPI
 
 from rodfem import Branch, Diagram, InputError, Plan, Scene, Solver, run, trace
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
@@ -152,15 +151,6 @@ def test_a_sweep_has_one_mesh() -> None:
     scene = demo_cases.scene("follower")
     with pytest.raises(InputError, match="is swept on one mesh"):
         Plan(scene.span, accuracy=1e-4).check(scene)
-
-
-@pytest.mark.parametrize("words", [("--elements", "8"), ("--degree=6",), ("--elem", "8")])
-def test_accuracy_and_a_mesh(words: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as left:
-        hemitropic_cases.run_demo("--accuracy", "1e-6", *words)
-    assert left.value.code == 2
-    if MPI.COMM_WORLD.rank == 0:
-        assert "error: --accuracy chooses elements and degree itself: leave out --" in capfd.readouterr().err
 
 
 @pytest.mark.few(2)

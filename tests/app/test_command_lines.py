@@ -20,6 +20,7 @@ LINES = {
     "--elements nan": "invalid int value",
     "--accuracy 0": "not attainable",
     "--accuracy 1e-6 --elements 8": "leave out --elements, or --accuracy",
+    "--accuracy 1e-6 --deg=6": "--accuracy chooses elements and degree itself: leave out --",
     "--range 0 1e-320": "as narrow as round-off",
     "--range 0 1e308": "outside its admissible range",
     "--range -inf 0": "lam = -inf is not a finite number",

@@ -12,9 +12,10 @@ import reference_values
 from hard.published import pressed
 from hard.writhing import clamped_rod
 from hemitropic_cases import DEFAULT, explored, follower, specials, user_points
+from rows import regular
 
 import rodfem
-from rodfem import Branch, Discretization, IndexStepControl, InputError, Plan, Point, SceneError, StepControl, trace
+from rodfem import Branch, Discretization, IndexStepControl, InputError, Plan, SceneError, StepControl, trace
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.output.files import load_state, states_of
@@ -138,19 +139,13 @@ def test_steps_that_bound_the_change_of_the_index() -> None:
         kind: rodfem.trace(rod, plan=Plan(depth=0, steps=kind(largest=0.2, first=0.2), error_bars=False))[0]
         for kind in (StepControl, IndexStepControl)
     }
-    changes = {kind: {abs(a.index - b.index) for a, b in pairwise(_rows(b))} for kind, b in found.items()}
+    changes = {kind: {abs(a.index - b.index) for a, b in pairwise(regular(b))} for kind, b in found.items()}
     assert changes == {StepControl: {0, 2}, IndexStepControl: {0, 1}}
     for branch in found.values():
         loads = [s.point.load for s in branch.special if s.kind == "branch point"]
         assert loads == pytest.approx([np.pi**2, 1.0001 * np.pi**2], rel=1e-9)
     with pytest.raises(InputError, match="A change of the index of 0 leads nowhere: give change=1 or more"):
         IndexStepControl(change=0)
-
-
-def _rows(branch: Branch) -> list[Point]:
-    """Points of a branch without its special points."""
-    special = {id(s.point) for s in branch.special if s.kind == "branch point"}
-    return [p for p in branch.points if id(p) not in special]
 
 
 @pytest.mark.ranks

@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg
 from classics import ON_AXIS, column, push
 from golden_cases import cases, trace
+from rows import regular
 
 import rodfem
 from rodfem import Discretization, Solver, pinned
@@ -46,7 +47,7 @@ def test_the_rate_is_the_derivative_along_the_branch(name: str) -> None:
     """Between rows of a branch, phase conditions included: the cubic through two rows is that of the row between."""
     diagram = trace(cases()[name](), error_bars=False)
     branch = diagram[-1]
-    rows = [p for p in branch.points if p.tangent is not None and not any(p is s.point for s in branch.special)]
+    rows = [p for p in regular(branch) if p.tangent is not None]
     solver, (a, b) = diagram.solvers[rows[4].mesh], rows[4:6]
     condensation = Condensation(solver.inertia)
     piece = Piece(solver, condensation, a, b, condensation.border(a.x))

@@ -9,6 +9,7 @@ import pytest
 from classics import column, euler
 from golden_cases import cases
 from petsc4py import PETSc
+from rows import regular
 
 from rodfem import ConvergenceError, Discretization, Plan, Point, Solver, StepControl, clamped, free, trace
 from rodfem.continuation.branch_solver import BranchSolver, Step
@@ -76,7 +77,7 @@ def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
         cases()["demo hemitropic"](), Discretization("auto", 8, 6), Plan(depth=1, error_bars=False, steps=steps)
     )
     system, most, told = diagram.solvers[0].system, UNEXPLAINED * steps.aim, list[bool]()
-    own = [[p for p in b.points if not any(p is s.point for s in b.special)] for b in diagram.branches]
+    own = list(map(regular, diagram.branches))
     for branch in own:
         for i in range(2, len(branch)):
             assert defect(system, branch[max(i - 3, 0) : i + 1]) <= most * (0.1 if steps.largest < 0.2 else 1.0)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from classics import bow, euler
 from golden_cases import cases
+from rows import regular
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 
@@ -21,9 +22,8 @@ MESHES = [Discretization("auto", 8, 6), Discretization("auto", 24, 1)]
 
 
 def rows(branch: Branch) -> list[Point]:
-    """Rows that the branch has been followed by: without its special points, and the state that it leaves."""
-    special = {id(s.point) for s in branch.special}
-    return [p for p in branch.points if id(p) not in special][1 if branch.parent else 0 :]
+    """Rows that the branch has been followed by, without the state that it leaves."""
+    return regular(branch)[1 if branch.parent else 0 :]
 
 
 @pytest.mark.ranks

@@ -2,27 +2,19 @@
 
 from dataclasses import replace
 from itertools import combinations
-from math import pi
 
 import classics
 import hemitropic_cases
 import numpy as np
 import pytest
 from demo_cases import Found, explored, scene
+from literature.test_cord import SHOOTING, default, shot
 from rescaled import DNA, rescaled
-from shooting_solver import Problem, Rod
 
 from rodfem import Discretization, InputError, Plan, Point, Solver, pinned, trace
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.deflation.search import NEW, Deflation, equilibria_at, turned_state
 from rodfem.deflation.symmetries import mirrors
-
-K0 = 3 * pi
-CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
-
-
-def cord() -> Found:
-    return explored("cord", "reduced", at=(39.9, 40.0, 40.1))
 
 
 def ruler() -> Found:
@@ -46,7 +38,7 @@ def force(follower: BranchSolver, x: object) -> float:
 @pytest.mark.long
 def test_cord() -> None:
     """From the straight state alone: all that exploring finds, and whatever else is found is an equilibrium."""
-    found = cord()
+    found = default()
     known = equilibria_at(found.follower, found.branches, 40.0)
     assert len(known) == 4
     search = Deflation(found.follower, 40.0, [p for p in known if abs(p.ordinate) < 1e-9])
@@ -57,9 +49,8 @@ def test_cord() -> None:
             assert (match.negative, match.zero) == (p.negative, p.zero)
     assert not [p for p in new if abs(p.ordinate) < 1e-9]
     for p in new:
-        n, k = found.start_of_rod(p)
-        guess = np.array([n[0], n[1], 40.0, k[0], k[1] - K0, k[2]])
-        q, end = CORD.solve(guess)
+        guess = shot(found, p)
+        q, end = SHOOTING.solve(guess)
         assert abs(q - guess).max() < 0.1
         assert (end[10], 1 - end[9]) == pytest.approx((p.energy, p.ordinate), abs=1e-4)
     assert search.tries.count(NEW) == len(new)

@@ -7,7 +7,7 @@ import classics
 import numpy as np
 import pytest
 from golden_cases import NOT_CONSERVATIVE, cases
-from literature.test_free_rods import floating
+from literature.test_free_rods import thrust
 from scipy.linalg import eigvals
 
 from rodfem import ConvergenceError, Discretization, Inertia, Parameter, Plan, Scene, Solver, clamped, free, trace
@@ -26,9 +26,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     ),
     **{name: cases()[name] for name in NOT_CONSERVATIVE},
     "torque": lambda: replace(classics.torque("follower_moment"), span=(0.0, 9.0)),
-    "floating": lambda: floating(
-        (free(), free(follower=lambda c: (0.0, 0.0, -c.P))), (0.0, 130.0), distributed=lambda c: (0.0, 0.0, c.P)
-    ),
+    "floating": lambda: thrust((0.0, 130.0)),
 }
 
 

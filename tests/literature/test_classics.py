@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from classics import FORMULATIONS, column, explore, sweep
 from closed_forms import HEAVY, TORQUE, elastica
-from numpy.polynomial import Legendre, Polynomial
 from scipy.linalg import eigvals, expm
 from scipy.optimize import brentq, fsolve
 from scipy.special import ellipe, ellipk
@@ -368,12 +367,8 @@ def nicolai(T: float) -> float:
 
     1.5 x'''' + T y''' = mu x and y'''' - T x''' = mu y, clamped, without moment and force at the free end.
     """
-    s, weights = np.polynomial.legendre.leggauss(40)
-    s, weights = (s + 1) / 2, weights / 2
-    clamp = Polynomial([0.0, 0.0, 1.0])
-    basis = [clamp * Legendre.basis(i, domain=[0, 1]).convert(kind=Polynomial) for i in range(12)]
-    f = [np.array([g.deriv(d)(s) if d else g(s) for g in basis]) for d in range(4)]
-    stiffness, turning, mass = ((f[i] * weights) @ f[j].T for i, j in ((2, 2), (0, 3), (0, 0)))
+    _, weights, f = closed_forms.polynomials(12)
+    stiffness, turning, mass = ((f(i) * weights) @ f(j).T for i, j in ((2, 2), (0, 3), (0, 0)))
     A = np.block([[1.5 * stiffness, T * turning], [-T * turning, stiffness]])
     mu = eigvals(A, np.kron(np.eye(2), mass))
     first, second = mu[np.argsort(mu.real)][:2]
@@ -399,16 +394,3 @@ def test_torque_about_the_axis_of_a_hinge(kind: str) -> None:
         (0, pytest.approx(4.0)),
         (2, pytest.approx(5.0)),
     ]
-
-
-@pytest.mark.long
-def test_which_loads_have_a_potential() -> None:
-    def conservative(**load: Callable) -> bool:
-        return column("loaded", (clamped(), End(**load)), (0.0, 1.0), inertia=classics.BEAM).conservative
-
-    assert conservative(force=classics.push)
-    assert not conservative(follower=classics.push)
-    assert not conservative(moment=classics.push)
-    assert not conservative(follower_moment=classics.push)
-    assert all(s().conservative for s in (classics.semi_tangential, classics.heavy, classics.pressed_ring))
-    assert not classics.leipholz().conservative

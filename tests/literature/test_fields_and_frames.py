@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import ufl
 from classics import BEAM, ON_AXIS, circle, column
-from numpy.polynomial import Legendre
+from closed_forms import polynomials
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigvalsh, expm
 from scipy.optimize import brentq, root
@@ -26,10 +26,8 @@ def test_rotating_cantilever() -> None:
 
     The tension is ``12^2 (1 - s^2)/2``; in the plane of rotation ``omega^2`` is less by 12^2.
     """
-    x, w = np.polynomial.legendre.leggauss(40)
-    x, w = (x + 1) / 2, w / 2
-    shapes = [Legendre([1 / 3, 1 / 2, 1 / 6], domain=[0, 1]) * Legendre.basis(i, domain=[0, 1]) for i in range(14)]
-    f, df, ddf = (np.array([g.deriv(n)(x) for g in shapes]) for n in (0, 1, 2))
+    x, w, values = polynomials(14)
+    f, df, ddf = (values(n) for n in (0, 1, 2))
 
     def out_of_plane(B: float) -> np.ndarray:
         return eigvalsh(B * (ddf * w) @ ddf.T + (df * w * 72 * (1 - x * x)) @ df.T, (f * w) @ f.T)[:3]

@@ -1,9 +1,6 @@
 """The rod under a follower load against the frequency equation of Beck's column, solved in complex arithmetic."""
 
-import runpy
-import sys
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +9,10 @@ from classics import column as straight
 from closed_forms import column, double
 from demo_cases import scene
 from hemitropic_cases import specials
-from mpi4py import MPI
 
 from rodfem import Branch, Discretization, Ordinate, Solver, clamped, free, trace
 from rodfem.forms.energy import bending_and_twist
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
-
-DEMO = Path(__file__).parents[2] / "demos" / "follower.py"
 
 
 @cache
@@ -133,15 +127,3 @@ def test_no_spurious_eigenvalue_on_crude_meshes(elements: int, degree: int, P: f
         for mu in values[:2]:
             exact = [column(mu, P), column(mu, P, EI=10)]
             assert np.nanmin([abs(mu - e) for e in exact]) < (1e-6 if elements * degree > 8 else 0.1) * abs(mu)
-
-
-def test_reduced_formulation_is_refused(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
-) -> None:
-    monkeypatch.setattr(sys, "argv", [str(DEMO), "--formulation", "reduced", "--output", str(folder)])
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_path(str(DEMO), run_name="__main__")
-    out, err = capfd.readouterr()
-    assert (ended.value.code, out) == (2, "")
-    if MPI.COMM_WORLD.rank == 0:
-        assert err.startswith("error: The reduced formulation") and err.find("\n") == len(err) - 1

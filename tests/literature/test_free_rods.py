@@ -6,7 +6,7 @@ from math import pi
 import numpy as np
 import pytest
 from classics import BEAM, ROUND, circle, column, push
-from numpy.polynomial import Legendre
+from closed_forms import polynomials
 from scipy.interpolate import CubicSpline
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
@@ -63,18 +63,20 @@ def test_dead_forces_at_both_ends() -> None:
     assert {p.negative for p in pulled[0].points} == {0} and not pulled.special()
 
 
-def beal(load: float) -> np.ndarray:
-    """Eigenvalues of a free beam under a thrust along its end, by Galerkin's method with Legendre polynomials.
+def thrusted(P: float, m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and mass of a free beam with a mass ``m`` at its nose under a thrust at its tail that follows.
 
-    ``int w'' v'' - P s w' v' ds + P w'(1) v(1) = mu int w v ds``: the compression is P s, and the thrust follows.
+    ``int w'' v'' - P (m + s)/(1 + m) w' v' ds + P w'(1) v(1) = mu (int w v ds + m w(0) v(0))``, by Galerkin's method.
     """
-    basis = [Legendre.basis(i, domain=(0.0, 1.0)) for i in range(18)]
-    x, weight = np.polynomial.legendre.leggauss(24)
-    s, weight = (x + 1) / 2, weight / 2
-    w, dw, d2w = (np.array([b.deriv(k)(s) if k else b(s) for b in basis]) for k in range(3))
-    at_end = np.outer([b(1.0) for b in basis], [b.deriv()(1.0) for b in basis])
-    K = (d2w * weight) @ d2w.T - load * (dw * weight * s) @ dw.T + load * at_end
-    return np.linalg.eigvals(np.linalg.solve((w * weight) @ w.T, K))
+    s, weight, w = polynomials(18, clamped=False)
+    (nose,), (tip,), (slope,) = w(0, [0.0]).T, w(0, [1.0]).T, w(1, [1.0]).T
+    K = (w(2) * weight) @ w(2).T - (w(1) * weight * P * (m + s) / (1 + m)) @ w(1).T + P * np.outer(tip, slope)
+    return K, (w(0) * weight) @ w(0).T + m * np.outer(nose, nose)
+
+
+def beal(P: float) -> np.ndarray:
+    """Eigenvalues without a mass at its nose."""
+    return eigvals(*thrusted(P))
 
 
 @pytest.mark.long
@@ -124,25 +126,16 @@ def test_thrust_along_the_end_of_a_rod_with_a_mass_at_its_nose(mesh: Discretizat
     The determinant is ``mu^2 (a + b mu + ...)``, and the rod diverges where ``a``, a contour integral, vanishes.  Then
     a second eigenvalue does, and meets the first one: no less than these two negative ones are complex after that.
     """
-    m, degrees = 1.0, range(16)
-    x, w = np.polynomial.legendre.leggauss(40)
-    x, w = (x + 1) / 2, w / 2
-    f, df, ddf = (np.array([Legendre.basis(d, domain=[0, 1]).deriv(n)(x) for d in degrees]) for n in (0, 1, 2))
-    nose, tip, slope = (np.array([Legendre.basis(d, domain=[0, 1]).deriv(n)(s) for d in degrees])
-                        for n, s in ((0, 0.0), (0, 1.0), (1, 1.0)))  # fmt: skip
-    mass = (f * w) @ f.T + m * np.outer(nose, nose)
-
-    def stiffness(P: float) -> np.ndarray:
-        return (ddf * w) @ ddf.T - (df * w * P * (m + x) / (1 + m)) @ df.T + P * np.outer(tip, slope)
+    m = 1.0
 
     def vanishing(P: float) -> float:
-        S, circle = stiffness(P), 30.0 * np.exp(2j * pi * (np.arange(32) + 0.5) / 32)
+        (S, mass), circle = thrusted(P, m), 30.0 * np.exp(2j * pi * (np.arange(32) + 0.5) / 32)
         size = np.linalg.slogdet(S - circle[0] * mass)[1]
         signs, sizes = np.linalg.slogdet(S - circle[:, None, None] * mass)
         return float(np.mean(signs * np.exp(sizes - size) / circle**2).real)
 
     def discriminant(P: float) -> float:
-        mu = eigvals(stiffness(P), mass)
+        mu = eigvals(*thrusted(P, m))
         first, second = mu[np.argsort(abs(mu))][2:4]
         return float(((first - second) ** 2).real)
 

@@ -7,6 +7,7 @@ import pytest
 import reference_values
 from classics import SUPPORTS, column
 from hemitropic_cases import DEFAULT, Constants, explored, follower, specials, user_points
+from rows import regular
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipe, ellipk
@@ -33,12 +34,6 @@ def from_point(all_branches: list[Branch], parent: str, number: int) -> Branch:
     return found
 
 
-def interior(branch: Branch) -> list:
-    """Points of a branch that are no special points."""
-    singular = [id(s.point) for s in branch.special if s.kind != "user"]
-    return [p for p in branch.points[1:] if id(p) not in singular]
-
-
 @pytest.mark.long
 def test_first_branch() -> None:
     first = from_point(branches(), "straight", 0)
@@ -59,7 +54,7 @@ def test_second_branch() -> None:
     assert fold.point.load == pytest.approx(reference_values.FOLD[0], abs=2e-11)
     assert (fold.point.ordinate, fold.point.energy) == pytest.approx(reference_values.FOLD[1:], abs=1e-9)
     assert (fold.negative_before, fold.negative_after, fold.multiplicity) == (3, 2, 1)
-    for p in interior(second):
+    for p in regular(second)[1:]:
         assert (p.negative, p.zero) == (3 if p.arclength < fold.point.arclength else 2, 1)
     for load, ordinates in reference_values.AROUND_FOLD.items():
         assert [p.ordinate for p in user_points(second, load)] == pytest.approx(ordinates, abs=2e-11)

@@ -4,9 +4,9 @@ import classics
 import numpy as np
 import pytest
 from closed_forms import tip
-from scipy.optimize import brentq
+from literature.test_rods import zeros
 
-from rodfem import Discretization, Inertia, Ordinate, Scene, Solver, clamped, free, hinged
+from rodfem import Discretization, Inertia, Ordinate, Scene, Solver, free, hinged
 from rodfem.forms.energy import bending_and_twist
 
 pytestmark = pytest.mark.ranks
@@ -24,19 +24,10 @@ METHODS = ["auto", "shift-invert", "slicing", "reduction", "cayley", "dense"]
 def cantilever(length: float, stiffness: float, mass: float) -> Scene:
     """Twenty times stiffer in the other plane, whose frequencies are among neither of the first two here."""
     return classics.column(
-        "cantilever",
-        (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
-        (0.0, 5.0 * stiffness / length**2),
-        interval=(0.0, length),
+        "cantilever", classics.SUPPORTS["clamped-free"], (0.0, 5.0 * stiffness / length**2), interval=(0.0, length),
         energy=lambda v, k, c: bending_and_twist(k, (stiffness, 1e3 * stiffness, stiffness)),
-        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
-        inertia=Inertia(rho_A=lambda c: mass),
-    )
-
-
-def dead(mu: float, thrust: float) -> float:
-    """Zero at the eigenvalues of the cantilever, in units of its stiffness, length and mass."""
-    return tip(mu, thrust, 0.0).real
+        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]), inertia=Inertia(rho_A=lambda c: mass),
+    )  # fmt: skip
 
 
 @pytest.mark.long
@@ -46,13 +37,7 @@ def test_each_method_finds_those_of_a_cantilever_under_thrust(units: tuple[float
     of_force, of_value = stiffness / length**2, stiffness / (mass * length**4)
     solver = Solver(cantilever(*units), Discretization("pointwise", 5, 7))
     for thrust, index in LOADS:
-        grid = np.linspace(-20.0, 600.0, 156) + 0.0123
-        signs = [dead(mu, thrust) for mu in grid]
-        exact = [
-            brentq(dead, a, b, args=(thrust,), xtol=1e-13)
-            for a, b, f, g in zip(grid, grid[1:], signs, signs[1:], strict=False)
-            if f * g < 0
-        ][:2]
+        exact = zeros(lambda mu, P=thrust: tip(mu, P, share=0.0).real, -20.0, 600.0, 155)[:2]
         point = solver.equilibrium(thrust * of_force)
         for method in METHODS:
             found = solver.assess(point, method, 2)
@@ -70,15 +55,10 @@ def test_a_rod_that_turns_about_a_hinge(units: tuple[float, float, float]) -> No
     """Its free rotation left out, ``tan b = tanh b``: a rotation with a mass of its own, whatever the units."""
     length, stiffness, mass = units
     rod = classics.column(
-        "hinged",
-        (hinged((0.0, 1.0, 0.0)), free(follower=lambda c: (0.0, 0.0, -c.P))),
-        (0.0, stiffness / length**2),
-        interval=(0.0, length),
-        energy=lambda v, k, c: bending_and_twist(k, (1e3 * stiffness, stiffness, stiffness)),
-        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
-        inertia=Inertia(rho_A=lambda c: mass),
-        planar="e2",
-    )
+        "hinged", (hinged((0.0, 1.0, 0.0)), free(follower=classics.push)), (0.0, stiffness / length**2), planar="e2",
+        interval=(0.0, length), energy=lambda v, k, c: bending_and_twist(k, (1e3 * stiffness, stiffness, stiffness)),
+        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]), inertia=Inertia(rho_A=lambda c: mass),
+    )  # fmt: skip
     solver = Solver(rod, Discretization("pointwise", 5, 7))
     point = solver.equilibrium(0.0)
     exact = np.array([3.926602312047919, 7.068582745628732]) ** 4 * stiffness / (mass * length**4)
