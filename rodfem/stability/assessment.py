@@ -83,7 +83,8 @@ class Verdict:
     def __repr__(self) -> str:
         """Stability, counts and the left-most eigenvalue."""
         first = f", left-most mu = {self.values[0]:.10g}" if len(self.values) else ""
-        words = f"{WORDS[self.stable]}, {self.negative} negative, {self.zero} zero"
+        undecided = f", {self.undecided} undecided" if self.undecided else ""
+        words = f"{WORDS[self.stable]}, {self.negative} negative{undecided}, {self.zero} zero"
         return f"<Verdict by {self.method}: {words}{first}>"
 
     def __str__(self) -> str:

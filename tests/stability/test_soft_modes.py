@@ -236,4 +236,5 @@ def test_a_mesh_that_cannot_hold_the_turns_decides_no_index() -> None:
     )  # fmt: skip
     found = trace(shaft, Discretization("reduced", 4, 6), Plan(depth=0))
     assert [(row.negative, row.undecided) for row in found[0].points] == [(0, 4)] * len(found[0].points)
+    assert "undecided, 0 negative, 4 undecided" in repr(found.assess(found[0].points[0]))
     assert "unstable" not in found.in_words()
