@@ -57,7 +57,8 @@ def rounding_of(matrix: PETSc.Mat, v: np.ndarray, x: np.ndarray) -> float:
 
 def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:
     """All of a matrix on every rank."""
-    return sp.vstack(matrix.comm.tompi4py().allgather(local_rows(matrix))).tocsr()
+    own, comm = local_rows(matrix), matrix.comm.tompi4py()
+    return own if comm.size == 1 else sp.vstack(comm.allgather(own)).tocsr()
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ from rodfem.problem.table import Table, tables_of
 from rodfem.problem.trials import check_function, symbols
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import check_scene
-from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, same_place
+from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
 
 GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
 """Names that branches are given as they are found."""
@@ -371,7 +371,7 @@ class Scene(Contribution, metaclass=Stated):
             self.parameters[self.load].check(self.load, value)
         if span[0] == span[1]:
             raise SceneError(f"The range of {self.load} from {span[0]:g} to {span[1]:g} is empty: give two loads.")
-        if abs(span[1] - span[0]) <= NEGLIGIBLE * max(map(abs, span)):
+        if abs(span[1] - span[0]) <= NEGLIGIBLE * max(map(abs, span)) + TINY:
             what = f"The range of {self.load} from {span[0]:.17g} to {span[1]:.17g}"
             raise SceneError(f"{what} is as narrow as round-off: choose others.")
         if tuple(span) != self.span:
