@@ -26,7 +26,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import ROWS, BranchSolver, cubic_weights, lagrange
-from rodfem.continuation.singular import SPLIT, Curve, Section, SingularState, SingularSystem
+from rodfem.continuation.singular import SHARP, SPLIT, Curve, Linear, Section, SingularState, SingularSystem, Vectors
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.state import Line, line
 from rodfem.fem.system import System
@@ -41,6 +41,9 @@ UNSTABLE = "another frequency has become unstable, or stable, since the row befo
 """Marks of a row where their number has changed, with a potential and without one."""
 IMPERFECT = 1e-7
 """Over the lowest bending eigenvalue, or over the terms that cancel: a larger imperfection is not one of the mesh."""
+PITCHFORK = 1e-6
+"""Derivative of an eigenvalue along its null vector, over the lowest bending one, of which a symmetry leaves less."""
+WIDE = 4e-3  # step of second differences, which lose more digits to round-off, in the metric
 FEWER = 1e-5
 """Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
 their mean, are not equal by a symmetry."""
@@ -200,13 +203,73 @@ class Criterion(ABC):
         """
 
 
+class SingularCurve(SingularSystem):
+    """The singular system in two parameters, whose solutions form curves."""
+
+    def curve(self, at: Linear, found: tuple[PETSc.Vec, float, np.ndarray], null: Vectors, noise: float) -> Curve:
+        """See :class:`SingularSystem`."""
+        share = found[-1]
+        quartic = self._quartic(at, found, null[0])
+        (m, k), own = at.Z.shape, self._own(at)[1:, 1:]
+        table = at.rows[m - k :, 1:] @ own
+        slope = np.linalg.svd(table / np.maximum(abs(table).max(axis=1), TINY)[:, None])[2][-1]
+        square = np.vstack([table, slope]) if self.fold else np.vstack([table[-1:, :2], slope[:2]])
+        dx = combine(at.vectors[1:], own @ slope)
+        self.system.set_load(dx, 0.0)
+        return Curve(
+            share[:2],
+            slope[:2],
+            dx,
+            int(np.copysign(1.0, np.linalg.det(square))),
+            table[-1, :2] / k,
+            -at.b.T @ at.Z,
+            0.0 if self.fold else self._part(at, slope[:2] / np.linalg.norm(slope[:2]), noise),
+            float(table[-1, 2]) if self.fold else quartic,
+            [combine(at.V, z) for z in np.hstack([at.Z, at.N]).T],
+            at.left,
+            self._negative(at.N) if self.psi is self.phi else -1,
+        )
+
+    def _quartic(self, at: Linear, found: tuple[PETSc.Vec, float, np.ndarray], null: PETSc.Vec) -> float:
+        """Fourth derivative of the energy along a pitchfork's branch, at the state that is factored.
+
+        The branch bends by ``z`` with ``S z = -y``: it is ``V . F_xxx V V V + 3 z . y``; zero of what is no pitchfork.
+        """
+        simple, (x, t, _) = self.count == 1 and not self.fold and self.psi is self.phi, found
+        if not simple or abs(null.dot(at.y)) > PITCHFORK * self.inertia.scale:
+            return 0.0
+        (z, *V), border = self._bordered[0].solve([-at.y])
+        z, bend = combine([z, *V], np.array([1.0, *(at.N @ self.rest(at.N, at.G, -border[:, 0]))])), 0.0
+        for step, weight in SHARP:
+            image, _ = self.images(x + null * (step * WIDE), [null], t)
+            bend += weight / (step * WIDE**2) * image.dot(null)
+        self._matrix(x, t)
+        return bend + 3 * z.dot(at.y)
+
+    def _part(self, at: Linear, direction: np.ndarray, noise: float) -> float:
+        """Part of the change of the equations along a direction of the parameters that does work on null vectors."""
+        work, terms = np.zeros(len(at.left)), np.zeros(len(at.left))
+        for i, left in enumerate(at.left):
+            each = combine(at.columns, direction)
+            each.pointwiseMult(each, left)
+            work[i], terms[i] = abs(each.sum()), each.norm(PETSc.NormType.NORM_1)
+        return float((work[work > noise] / terms[work > noise]).max(initial=0.0))
+
+    def _negative(self, N: np.ndarray) -> int:
+        """Eigenvalues clearly below zero, but for those that vanish, at the state that the matrix holds."""
+        self.inertia.move(-self.inertia.tolerance)
+        _, _, G, far = self._modes(self.inertia.matrix)
+        G = N.T @ G @ N
+        return far + int((np.linalg.eigvalsh(G + G.T) > 0).sum())
+
+
 class Singular(Criterion):
     """Corrects states to where the tangent matrix is singular: a ``fold``, else a branch point or divergence."""
 
     def __init__(self, solver: BranchSolver, plane: Plane, near: LocusPoint, *, fold: bool) -> None:
         super().__init__(solver, plane)
         self.fold = fold
-        self.states = SingularSystem(solver, near.modes, near.multiplicity, fold=fold)
+        self.states = SingularCurve(solver, near.modes, near.multiplicity, fold=fold)
         self.scale, self.metric = solver.inertia.scale, solver.inertia.metric
         self.frequencies = NonsymmetricSolver(solver.system) if near.left else None
         self.others = UNSTABLE if near.left else VANISHED
@@ -433,7 +496,7 @@ def unstable(pencil: NonsymmetricPencil, size: int = 0, basis: np.ndarray | None
 
 def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
     """Right and left null vectors of the tangent matrix at ``x``, not symmetric, with the ``number`` it has there."""
-    states = SingularSystem(solver, [], number, fold=False)
+    states = SingularCurve(solver, [], number, fold=False)
     metric = solver.inertia.metric
     right = left = [solver.inertia.seed(i) for i in range(number)]
     for _ in range(3):

@@ -86,13 +86,12 @@ def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def predict(points: Sequence[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """State and direction at arclength ``s``, extrapolated from up to four points, or the last one and its tangent."""
-    last, recent = points[-1], points[-ROWS:]
-    if len(points) < 3:
-        assert last.tangent is not None
-        return combine([last.x, last.tangent], np.array([1.0, s - last.arclength])), last.tangent.copy()
-    value, slope = lagrange(np.array([p.arclength for p in recent]), s)
-    return combine([p.x for p in recent], value), combine([p.x for p in recent], slope)
+    """State and direction at arclength ``s``: of the cubic of the last two points, or the last one and its tangent."""
+    if len(points) > 1:
+        return interpolant(points[-2], points[-1], s)
+    last = points[-1]
+    assert last.tangent is not None
+    return combine([last.x, last.tangent], np.array([1.0, s - last.arclength])), last.tangent.copy()
 
 
 def predict_at_load(system: System, points: Sequence[Point], load: float) -> PETSc.Vec:

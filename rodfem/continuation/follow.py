@@ -1,6 +1,6 @@
 """Pseudo-arclength continuation: following a curve of equilibria with control of the step, and checks of its rows.
 
-The predictor extrapolates the last points of the branch by a polynomial in arclength (up to cubic); the corrector is
+The predictor extrapolates the cubic of the last two points of the branch and their tangents; the corrector is
 Newton's method on the plane through the prediction orthogonal to the predicted direction (Keller 1977).  The step is
 chosen such that the corrector moves a prediction by a set distance.
 
@@ -186,7 +186,7 @@ class _Walk:
         point = self.solver.point(made.x, place, made.tangent, made.outcome, made.index)
         if not self._stays(known, point) or not self.steps.accepts(known[-1], point):
             return None
-        order = 2 if len(known) == 1 else min(len(known), 3) + 1
+        order = 2 if len(known) == 1 else 4
         self._next, self._offset = self.steps.after(self._step, made.outcome.moved, order), 0.0
         return point
 

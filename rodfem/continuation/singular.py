@@ -60,9 +60,6 @@ from rodfem.stability.inertia import Factored
 from rodfem.stability.reduced_stiffness import DIFFERENCE, Bordered, bordered_of
 from rodfem.tolerances import TINY
 
-PITCHFORK = 1e-6
-"""Derivative of an eigenvalue along its null vector, over the lowest bending one, of which a symmetry leaves less."""
-WIDE = 4e-3  # step of second differences, which lose more digits to round-off, in the metric
 FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown."""
 SPLIT = 1.1
@@ -127,7 +124,7 @@ class SingularState:
 
 
 @dataclass(frozen=True)
-class _Linear:
+class Linear:
     """The equations linearised at a state; ``y`` and ``f`` (parameters,) are sums over the null vectors.
 
     At a branch point ``r`` and ``q`` (k, parameters) are of each of them.
@@ -147,14 +144,17 @@ class _Linear:
 
     @property
     def V(self) -> list[PETSc.Vec]:
+        """Modes of the border, relaxed."""
         return self.vectors[-len(self.border) :]
 
     @property
     def b(self) -> np.ndarray:
+        """Work of the parameters on them."""
         return self.border[:, 1 : -len(self.border)]
 
     @property
     def G(self) -> np.ndarray:
+        """Minus their reduced stiffness matrix."""
         return self.border[:, -len(self.border) :]
 
 
@@ -193,14 +193,14 @@ class SingularSystem:
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
         """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""
         self._section = section
-        start, x, t, moved = x, x.copy(), 0.0, 0.0
-        at: _Linear | None = None
+        start, x, t, moved, size = x, x.copy(), 0.0, 0.0, np.inf
+        at: Linear | None = None
         step: Step | None = None
 
         def iteration(fresh: bool) -> Correction | None:
-            nonlocal at, step, t, moved
-            try:  # on a curve third derivatives, which cost most, serve again where corrections shrink tenfold
-                at = self._linear(x, t, at if section and not fresh else None)
+            nonlocal at, step, t, moved, size
+            try:  # third derivatives, which cost most, serve again: on a curve where corrections shrink tenfold
+                at = self._linear(x, t, at if (section and not fresh) or 100 * size**2 < TOLERANCE else None)
                 dx, share = step = self._step(at, x - start, t)
             except (ConvergenceError, np.linalg.LinAlgError):
                 return None
@@ -218,7 +218,7 @@ class SingularSystem:
         step[0].scale(outcome.error if outcome.error < TOLERANCE else 1.0)  # what convergence leaves, or round-off
         return self._state(x, t, at, step)
 
-    def _lost(self, x: PETSc.Vec, at: _Linear | None, step: Step | None) -> bool:
+    def _lost(self, x: PETSc.Vec, at: Linear | None, step: Step | None) -> bool:
         """Whether round-off of the eigenvalue at ``x`` moves the load by as much as a step to a branch point."""
         if self.fold or self._section is not None or at is None or step is None:
             return False
@@ -268,7 +268,7 @@ class SingularSystem:
         left = [bordered.solve()[0] for bordered in self._bordered[1:]]
         return solved[:count], [solved[count:], *left], border, counts[0]
 
-    def _linear(self, x: PETSc.Vec, t: float, old: _Linear | None = None, *, sharp: bool = False) -> _Linear:
+    def _linear(self, x: PETSc.Vec, t: float, old: Linear | None = None, *, sharp: bool = False) -> Linear:
         """Factor the bordered matrix, and solve with it; derivatives of an ``old`` linearisation serve again."""
         system = self.system
         columns = [] if self._section is None or old else [self._second(x, t)]
@@ -288,7 +288,7 @@ class SingularSystem:
             null, left = ([combine(side, z) for z in Z.T] for side in (V, sides[-1]))
             y, f = self._along_null(x, t, (null, left), sharp=sharp)
             r, q = self._along_load(x, t, responses[0], [] if self.fold else left)
-            at = _Linear([s, *responses, *V], border, columns, Z, N, left, y, f, r, q, border)
+            at = Linear([s, *responses, *V], border, columns, Z, N, left, y, f, r, q, border)
         return replace(at, rows=self._equations(at))
 
     def split(self, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -300,7 +300,7 @@ class SingularSystem:
         order = np.argsort(-np.linalg.norm(self.Z.T @ vectors, axis=0))
         return vectors[:, order[:k]], vectors[:, order[k:]]
 
-    def _equations(self, at: _Linear) -> np.ndarray:
+    def _equations(self, at: Linear) -> np.ndarray:
         """The rows of the equations."""
         forces = (np.hstack([at.N, at.Z]).T if self.fold else at.N.T) @ at.border
         trace = np.array([v.dot(at.y) for v in at.vectors])
@@ -344,14 +344,14 @@ class SingularSystem:
                 image.axpy(share, part)
         return r, q
 
-    def _work(self, at: _Linear) -> np.ndarray:
+    def _work(self, at: Linear) -> np.ndarray:
         """Rows (k, 1 + parameters + m) of ``Z^t b = 0``."""
         rows = np.array([[v.dot(image) for v in at.vectors] for image in at.r])
         rows[:, 1 : 1 + at.q.shape[1]] += at.q
         rows[:, 0] -= at.Z.T @ at.b[:, 0]
         return rows
 
-    def _step(self, at: _Linear, moved: PETSc.Vec, t: float) -> Step:
+    def _step(self, at: Linear, moved: PETSc.Vec, t: float) -> Step:
         """Newton's step, from ``moved`` and ``t`` off where the section is."""
         m, k = at.Z.shape
         if self._section is not None:
@@ -368,21 +368,21 @@ class SingularSystem:
         self.Z = at.Z
         return combine(at.vectors, np.array([1.0, *share])), share
 
-    def _own(self, at: _Linear) -> np.ndarray:
+    def _own(self, at: Linear) -> np.ndarray:
         """Columns (3 + m, 3 + k) of ``s``, both parameters and the null vectors, which modes near by follow."""
         moved = at.N @ self.rest(at.N, at.G, -at.border[:, :3])
         return np.block([[np.eye(3, 3 + self.count)], [moved, at.Z]])
 
-    def _plane(self, at: _Linear, section: Section, moved: PETSc.Vec, t: float) -> np.ndarray:
+    def _plane(self, at: Linear, section: Section, moved: PETSc.Vec, t: float) -> np.ndarray:
         """Row of the equation of the section."""
         along = [0.0 if section.row is None else section.row.dot(v) for v in (moved, *at.vectors)]
         along[1] += along[0] + section.weight * t
         along[3] += section.weight
         return np.array(along[1:])
 
-    def _state(self, x: PETSc.Vec, t: float, at: _Linear, step: Step) -> SingularState:
+    def _state(self, x: PETSc.Vec, t: float, at: Linear, step: Step) -> SingularState:
         """The solution ``x``, ``t``, which the last step has led to."""
-        (last, share), curve, k = step, None, self.count
+        (last, share), k = step, self.count
         changes = [1.0, *share]
         if self._section is not None:  # the derivatives so far are those of an iterate
             at, changes = self._linear(x, t, sharp=True), [1.0, *np.zeros(len(share))]
@@ -391,9 +391,7 @@ class SingularSystem:
         null = [combine(modes, z) for z in at.Z.T]
         # rounding errors of phi . F, independent and as large as those of phi . S x, a hundred times
         noise = 100.0 * max(rounding(matrix, v, x) for v in null) + 1e-15 * self.inertia.scale  # or all vanish
-        if self._section is not None:
-            quartic = self._quartic(x, t, at, null[0])
-            curve = self._curve(share[:2], at, noise, quartic)
+        curve = self.curve(at, (x, t, share), null, noise)
         others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z
         response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self.rest(at.N, at.G, -at.b[:, 0]))]))
         vectors = [v.copy() for v in null]
@@ -417,43 +415,11 @@ class SingularSystem:
             curve,
         )
 
-    def _curve(self, last: np.ndarray, at: _Linear, noise: float, quartic: float) -> Curve:
-        """The curve through a solution."""
-        (m, k), own = at.Z.shape, self._own(at)[1:, 1:]
-        table = at.rows[m - k :, 1:] @ own
-        slope = np.linalg.svd(table / np.maximum(abs(table).max(axis=1), TINY)[:, None])[2][-1]
-        square = np.vstack([table, slope]) if self.fold else np.vstack([table[-1:, :2], slope[:2]])
-        dx = combine(at.vectors[1:], own @ slope)
-        self.system.set_load(dx, 0.0)
-        return Curve(
-            last,
-            slope[:2],
-            dx,
-            int(np.copysign(1.0, np.linalg.det(square))),
-            table[-1, :2] / k,
-            -at.b.T @ at.Z,
-            0.0 if self.fold else self._part(at, slope[:2] / np.linalg.norm(slope[:2]), noise),
-            float(table[-1, 2]) if self.fold else quartic,
-            [combine(at.V, z) for z in np.hstack([at.Z, at.N]).T],
-            at.left,
-            self._negative(at.N) if self.psi is self.phi else -1,
-        )
-
-    def _quartic(self, x: PETSc.Vec, t: float, at: _Linear, null: PETSc.Vec) -> float:
-        """Fourth derivative of the energy along a pitchfork's branch, at the state ``x``, ``t`` that is factored.
-
-        The branch bends by ``z`` with ``S z = -y``: it is ``V . F_xxx V V V + 3 z . y``; zero of what is no pitchfork.
-        """
-        simple = self.count == 1 and not self.fold and self.psi is self.phi
-        if not simple or abs(null.dot(at.y)) > PITCHFORK * self.inertia.scale:
-            return 0.0
-        (z, *V), border = self._bordered[0].solve([-at.y])
-        z, bend = combine([z, *V], np.array([1.0, *(at.N @ self.rest(at.N, at.G, -border[:, 0]))])), 0.0
-        for step, weight in SHARP:
-            image, _ = self.images(x + null * (step * WIDE), [null], t)
-            bend += weight / (step * WIDE**2) * image.dot(null)
-        self._matrix(x, t)
-        return bend + 3 * z.dot(at.y)
+    def curve(
+        self, at: Linear, found: tuple[PETSc.Vec, float, np.ndarray], null: Vectors, noise: float
+    ) -> Curve | None:
+        """The curve through a solution, its state, t and the share of the last step; none of a system of points."""
+        return None
 
     def rest(self, N: np.ndarray, G: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Amplitudes (m - k, ...) of modes near by under ``forces`` (m, ...); zero where nothing holds a mode."""
@@ -462,23 +428,7 @@ class SingularSystem:
         stiff = abs(values) > FREE * self.inertia.scale
         return np.asarray((vectors[:, stiff] / values[stiff]) @ vectors[:, stiff].T @ N.T @ forces)
 
-    def _part(self, at: _Linear, direction: np.ndarray, noise: float) -> float:
-        """Part of the change of the equations along a direction of the parameters that does work on null vectors."""
-        work, terms = np.zeros(len(at.left)), np.zeros(len(at.left))
-        for i, left in enumerate(at.left):
-            each = combine(at.columns, direction)
-            each.pointwiseMult(each, left)
-            work[i], terms[i] = abs(each.sum()), each.norm(PETSc.NormType.NORM_1)
-        return float((work[work > noise] / terms[work > noise]).max(initial=0.0))
-
-    def _negative(self, N: np.ndarray) -> int:
-        """Eigenvalues clearly below zero, but for those that vanish, at the state that the matrix holds."""
-        self.inertia.move(-self.inertia.tolerance)
-        _, _, G, far = self._modes(self.inertia.matrix)
-        G = N.T @ G @ N
-        return far + int((np.linalg.eigvalsh(G + G.T) > 0).sum())
-
-    def _directions(self, w: PETSc.Vec, null: list[PETSc.Vec], at: _Linear) -> list[PETSc.Vec]:
+    def _directions(self, w: PETSc.Vec, null: list[PETSc.Vec], at: Linear) -> list[PETSc.Vec]:
         """Unit directions ``xi V + dlam (w, 1)`` with ``a xi^2 + 2 b xi dlam + c dlam^2 = 0``, the reduced equation."""
         if self.fold or len(null) > 1:
             return []

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.polynomial import Polynomial, legendre
+from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
@@ -21,6 +21,19 @@ from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.functions import derived
 from rodfem.problem.quaternions import CONJUGATE, directors, product
 from rodfem.writhe import lies_on_itself, writhe
+
+
+def turn(powers: list[float], t: float) -> float:
+    """Value of a polynomial of rising ``powers`` where it turns next to ``t``, from -1 to 1, by Newton's method."""
+    value = 0.0
+    for _ in range(6):
+        value = slope = bend = 0.0
+        for p in reversed(powers):
+            value, slope, bend = value * t + p, slope * t + value, bend * t + slope
+        if bend <= 0.0:
+            break
+        t = min(max(t - slope / (2 * bend), -1.0), 1.0)
+    return value
 
 
 class Shape:
@@ -67,9 +80,8 @@ class Shape:
     def stretch(self, x: PETSc.Vec) -> float:
         """Smallest stretch ``v3`` along the rod; 1 for an inextensible rod.
 
-        It is sought where the derivative of the polynomial vanishes, in each element whose least value at many points
-        is above that of the rod by less than a quarter of a second difference: a parabola falls half of that between
-        two neighbours.
+        It is sought where the polynomial turns, in each element whose least value at many points is above that of the
+        rod by less than a quarter of a second difference: a parabola falls half of that between two neighbours.
         """
         if 2 not in self.system.scene.free_strains:
             return 1.0
@@ -78,9 +90,9 @@ class Shape:
         lowest, comm = samples.min(axis=1), self.system.comm
         least = comm.allreduce(float(lowest.min()), op=MPI.MIN)
         near = lowest - least < abs(np.diff(samples, 2)).max(axis=1) / 4
-        curves = map(Polynomial, nodal[near] @ self._v_to_powers.T)
-        inside = [p(np.clip(p.deriv().roots().real, -1.0, 1.0)) for p in curves]
-        return float(comm.allreduce(min([least, *np.concatenate([*inside, []]).tolist()]), op=MPI.MIN))
+        begin = np.linspace(-1.0, 1.0, samples.shape[1])[samples[near].argmin(axis=1)]
+        inside = map(turn, (nodal[near] @ self._v_to_powers.T).tolist(), begin.tolist())
+        return float(comm.allreduce(min([least, *inside]), op=MPI.MIN))
 
     def sample(self, x: PETSc.Vec) -> dict[str, Any]:
         """All of a state in natural order on every rank, independent of the number of ranks.

@@ -141,12 +141,12 @@ def test_a_mesh_without_the_symmetry_of_the_rod() -> None:
 
 
 def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
-    """The bend of 1e-13 is sharper than the least step: the point is recorded with the size of its unfolding."""
-    found = diagram(cantilever(1e-13), depth=0, steps=StepControl(largest=0.05))
+    """The bend of 5e-14 is sharper than the least step: the point is recorded with the size of its unfolding."""
+    found = diagram(cantilever(5e-14), depth=0, steps=StepControl(largest=0.05))
     (special,) = [s for s in found.branches[0].special if s.kind != "end"]
     assert special.kind == IMPERFECT
-    assert special.note == "imperfect, unfolding 9e-14"
-    assert special.unfolding == pytest.approx(1e-13 * np.sqrt(2) * 2 / pi, rel=1e-3)
+    assert special.note == "imperfect, unfolding 5e-14"
+    assert special.unfolding == pytest.approx(5e-14 * np.sqrt(2) * 2 / pi, rel=1e-2)
 
 
 @pytest.mark.few(1)
