@@ -3,11 +3,12 @@
 from functools import cache
 from itertools import pairwise
 from math import hypot
+from typing import Any
 
 import classics
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from hard.shooting_plane import MOMENT, X, integrate
 from scipy.optimize import brentq
 
 from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, clamped, free, trace
@@ -32,16 +33,13 @@ def cantilever(high: float = HIGH) -> Scene:
 def tips(load: float) -> list[float]:
     """Where the tip of the cantilever is in all its equilibria, by shooting from the clamp."""
 
-    def shot(bend: float) -> np.ndarray:
-        def slope(s: float, y: np.ndarray) -> list[float]:
-            return [y[1], -(load * np.sin(y[0]) + LEAN * np.cos(y[0])) / 2, np.sin(y[0])]
+    def shot(m: Any) -> np.ndarray:
+        return integrate([0 * m, 0 * m, 0 * m, m, LEAN, -load], B=2.0).real
 
-        return solve_ivp(slope, (0.0, 1.0), [0.0, bend, 0.0], rtol=1e-10, atol=1e-12).y[:, -1]
-
-    bends = np.linspace(-6.0, 6.0, 121)
-    ends = [shot(bend)[1] for bend in bends]
-    pieces = [(p, q) for (p, x), (q, y) in pairwise(zip(bends, ends, strict=True)) if x * y < 0]
-    return sorted(shot(brentq(lambda bend: shot(bend)[1], p, q))[2] for p, q in pieces)
+    moments = np.linspace(-12.0, 12.0, 121)
+    ends = shot(moments)[MOMENT]
+    pieces = [(p, q) for (p, x), (q, y) in pairwise(zip(moments, ends, strict=True)) if x * y < 0]
+    return sorted(float(shot(brentq(lambda m: shot(m)[MOMENT], p, q))[X]) for p, q in pieces)
 
 
 def rows_are_apart(diagram: Diagram) -> bool:
