@@ -154,7 +154,7 @@ def _state(interval: Interval, data: Data) -> str:
         found = "rates" if interval.branch.get("rates") else "frequencies"
         return f"stable{plane}, by the {found} found," if sweep else f"stable{plane}"
     if interval.kind == UNDECIDED:
-        soft = ["an eigenvalue is too near zero for its sign to be known on this mesh"] * interval.soft
+        soft = ["the sign of an eigenvalue is not known on this mesh"] * interval.soft
         return f"of undecided stability ({'; '.join([on_kink(interval.kink)] * bool(interval.kink) + soft)})"
     if interval.kind == PLANAR:
         return f"stable in its plane but not in space (index {interval.in_space} at most)"

@@ -297,17 +297,12 @@ def _verdict(negative: int, undecided: int, space: int | None) -> str:
     """Stability in words, by numbers of eigenvalues: negative ones, undecided ones, and negative ones in space."""
     if undecided:
         begin = f"Unstable: {many(negative, 'negative eigenvalue')}, and" if negative else "Stability undecided:"
-        return f"{begin} {_too_near_zero(undecided)}"
+        return f"{begin} {many(undecided, 'eigenvalue')} whose sign is not known on this mesh"
     if negative:
         return f"Unstable: {many(negative, 'negative eigenvalue')}"
     if space:
         return f"Stable in the plane, unstable in space: {many(space, 'negative eigenvalue')} there"
     return "Stable: no negative eigenvalue of the second variation"
-
-
-def _too_near_zero(undecided: int) -> str:
-    sign = "its" if undecided == 1 else "their"
-    return f"{many(undecided, 'eigenvalue')} too near zero for {sign} sign to be known on this mesh"
 
 
 def _of_rates(negative: int, found: Sequence[Sequence[float]]) -> Words:

@@ -7,6 +7,7 @@ soft modes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 ONE_SIDE = "on one side of a kink"
 STABLE, PLANAR, UNSTABLE = "stable", "stable in the plane, unstable in space", "unstable"
@@ -30,7 +31,8 @@ class SoftMode:
 
     def __str__(self) -> str:
         doubt = "" if self.decided else ", sign undecided"
-        return f"{self.name}, mu = {self.value:.2g} +- {self.uncertainty:.0e}{doubt}"
+        bar = f" +- {self.uncertainty:.0e}" if isfinite(self.uncertainty) else " without a bound of its error"
+        return f"{self.name}, mu = {self.value:.2g}{bar}{doubt}"
 
 
 def stability(negative: int, undecided: int, doubt: str = "", in_space: int | None = None) -> str:
