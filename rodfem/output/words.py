@@ -279,9 +279,7 @@ def _at_special(row: Data, specials: Sequence[Data]) -> Words | None:
 def _stability(row: Data) -> Words:
     negative, undecided, space = row["negative"], row.get("undecided") or 0, row.get("negative_in_space")
     if row.get("kink"):
-        side = f"{many(negative, 'negative eigenvalue')} on one side" + (
-            f", and {_too_near_zero(undecided)}" * bool(undecided)
-        )
+        side = f"{many(negative, 'negative eigenvalue')} on one side" + (f", and {_open(undecided)}" * bool(undecided))
         sentence = f"Stability undecided: {on_kink(row['kink'])}; {side}."
         return Words(UNDECIDED, index_range(negative, undecided, row["kink"]), sentence)
     if "omega2" in row:
@@ -297,12 +295,16 @@ def _verdict(negative: int, undecided: int, space: int | None) -> str:
     """Stability in words, by numbers of eigenvalues: negative ones, undecided ones, and negative ones in space."""
     if undecided:
         begin = f"Unstable: {many(negative, 'negative eigenvalue')}, and" if negative else "Stability undecided:"
-        return f"{begin} {many(undecided, 'eigenvalue')} whose sign is not known on this mesh"
+        return f"{begin} {_open(undecided)}"
     if negative:
         return f"Unstable: {many(negative, 'negative eigenvalue')}"
     if space:
         return f"Stable in the plane, unstable in space: {many(space, 'negative eigenvalue')} there"
     return "Stable: no negative eigenvalue of the second variation"
+
+
+def _open(undecided: int) -> str:
+    return f"{many(undecided, 'eigenvalue')} whose sign is not known on this mesh"
 
 
 def _of_rates(negative: int, found: Sequence[Sequence[float]]) -> Words:

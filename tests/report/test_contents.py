@@ -188,6 +188,9 @@ def test_undecided_stability_is_not_called_stable() -> None:
     assert [w.verdict for w in words] == ["stable", "undecided", "unstable"]
     assert [w.index for w in words] == ["0", "0 or 1", "1 or 2"]
     assert all("eigenvalue whose sign is not known on this mesh" in w.sentence for w in words[1:])
+    kink = branch([0, 1], undecided=[0, 1])
+    kink["columns"]["kink"] = ["", "spring"]
+    assert "1 negative eigenvalue on one side, and 1 eigenvalue whose sign" in words_of(kink)[1].sentence
 
 
 def test_readings_are_those_of_the_file() -> None:
