@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import product
 from math import pi
 
+import classics
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -95,19 +96,11 @@ def test_tallest_heavy_column() -> None:
     one, two, four = map(tallest, (40, 80, 160))
     limit = four + (four - two) ** 2 / (2 * two - one - four)  # Aitken
     assert (limit / 7.8373474) ** 0.25 == pytest.approx(2.034, abs=1e-3)
-    heavy = Scene(
-        name="heavy column",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
+    heavy = classics.column(
+        "heavy column", (clamped(), free()), (0.0, 150.0), constants={"b": 1.0}, planar="e1",
         energy=lambda v, k, c: bending_and_twist(k, (c.b**6, 1.0, 1.0)),
-        parameters={"W": Parameter(0.0), "b": Parameter(1.0)},
-        load="W",
-        ends=(clamped(), free()),
-        distributed=lambda c: (0.0, 0.0, -c.W * c.b**3),
-        ordinate=Ordinate("deflection", s=1.0, of=lambda r, q: r[1]),
-        span=(0.0, 150.0),
-        planar="e1",
-    )
+        distributed=lambda c: (0.0, 0.0, -c.P * c.b**3), ordinate=Ordinate("deflection", s=1.0, of=lambda r, q: r[1]),
+    )  # fmt: skip
     field = Field(9, bounds=(0.1, 8.0), mean=1.0, power=3.0)
     best = rodfem.design(heavy, {"b": field}, discretization=Discretization(elements=8))
     uniform = rodfem.trace(heavy, depth=0).special("branch point")[0].point.load
@@ -126,19 +119,11 @@ def arch() -> Scene:
         half = np.sqrt(DEPTH) * np.cos(np.pi * s)
         return np.column_stack([np.cos(half), np.sin(half), 0 * s, 0 * s])
 
-    return Scene(
-        name="arch",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist((k[0] - c.mu * c.K, k[1], k[2]), (1.0, 1.0, 1.0)),
-        parameters={"mu": Parameter(0.0), "K": Parameter(1.0)},
-        load="mu",
-        ends=(pinned(), pinned((0.0, 0.0, 1.0 - DEPTH))),
-        ordinate=Ordinate("middle", s=0.5, of=lambda r, q: r[1]),
-        span=(0.0, 15.0 * DEPTH**0.5),
-        planar="e1",
-        start=bent,
-    )
+    return classics.column(
+        "arch", (pinned(), pinned((0.0, 0.0, 1.0 - DEPTH))), (0.0, 15.0 * DEPTH**0.5), load="mu", start=bent,
+        energy=lambda v, k, c: bending_and_twist((k[0] - c.mu * c.K, k[1], k[2]), (1.0, 1.0, 1.0)), planar="e1",
+        constants={"mu": 0.0, "K": 1.0}, ordinate=Ordinate("middle", s=0.5, of=lambda r, q: r[1]),
+    )  # fmt: skip
 
 
 def shallow(pattern: np.ndarray) -> float:

@@ -3,29 +3,24 @@
 from math import pi
 from pathlib import Path
 
+import classics
 import numpy as np
 import pytest
 
 import rodfem
-from rodfem import Field, Ordinate, Parameter, Scene, clamped, free
+from rodfem import Field, Ordinate, Scene, clamped, free
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.forms.energy import bending_and_twist
 
 
 def arc() -> Scene:
     """A strip with a natural curvature K in its plane, bent by a couple M and pushed across by a force F."""
-    return Scene(
-        name="arc",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
+    return classics.column(
+        "arc", (clamped(), free(force=lambda c: (0.0, c.F, 0.0), moment=lambda c: (c.M, 0.0, 0.0))), (0.0, 3.0),
+        load="M", constants={"M": 0.0, "B": 1.0, "K": 0.0, "F": 0.0}, planar="e1",
         energy=lambda v, k, c: bending_and_twist((k[0] - c.K, k[1], k[2]), (c.B, 1.0, 1.0)),
-        parameters={"M": Parameter(0.0), "B": Parameter(1.0), "K": Parameter(0.0), "F": Parameter(0.0)},
-        load="M",
-        ends=(clamped(), free(force=lambda c: (0.0, c.F, 0.0), moment=lambda c: (c.M, 0.0, 0.0))),
         ordinate=Ordinate("deflection", s=1.0, of=lambda r, q: r[1]),
-        span=(0.0, 3.0),
-        planar="e1",
-    )
+    )  # fmt: skip
 
 
 def deflection(k: np.ndarray) -> np.ndarray:
@@ -93,17 +88,10 @@ def test_natural_curvature_for_a_wanted_shape() -> None:
 
 
 def test_from_critical_loads_and_what_is_not_determined() -> None:
-    column = Scene(
-        name="column",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
+    column = classics.column(
+        "column", classics.SUPPORTS["clamped-free"], (0.0, 6.0), constants={"A": 1.0, "B": 1.5},
         energy=lambda v, k, c: bending_and_twist(k, (c.A, c.B, 1.0)),
-        parameters={"P": Parameter(0.0), "A": Parameter(1.0), "B": Parameter(1.5), "F": Parameter(0.0)},
-        load="P",
-        ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
-        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[0]),
-        span=(0.0, 6.0),
-    )
+    )  # fmt: skip
     found = rodfem.identify(column, {"critical loads": [0.3 * pi**2, 0.45 * pi**2]}, ("A", "B"))
     assert found.values == pytest.approx({"A": 1.2, "B": 1.8})
     with pytest.raises(ConvergenceError, match="do not determine B"):

@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import pi
 from pathlib import Path
 
+import classics
 import demo_cases
 import hemitropic_cases
 import numpy as np
@@ -119,18 +120,11 @@ def test_deviation_by_a_family(tmp_path: Path) -> None:
 
 def test_of_the_coefficient_of_a_pitchfork() -> None:
     """P = B pi^2/4 (1 + a^2/8), a = pi x/2 of the tip: pi^4/128 B x^2 (Timoshenko & Gere, section 2.7)."""
-    elastica = Scene(
-        name="elastica",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
+    elastica = classics.column(
+        "elastica", classics.SUPPORTS["clamped-free"], (1.0, 5.0), planar="e1", constants={"B": 1.5},
         energy=lambda v, k, c: bending_and_twist(k, (c.B, 1.0, 1.0)),
-        parameters={"P": 1.0, "B": 1.5},
-        load="P",
-        ends=(clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
         ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[1]),
-        span=(1.0, 5.0),
-        planar="e1",
-    )
+    )  # fmt: skip
     buckling = rodfem.trace(elastica, depth=1).special("branch point")[0]
     found = buckling.coefficient_derivative("B")
     assert abs(found.value - pi**4 / 128) <= found.error < 1e-4
@@ -150,17 +144,8 @@ def test_loads_of_a_double_point_split() -> None:
 
 def round_column() -> Scene:
     """A column between clamps whose two stiffnesses are one by accident."""
-    return Scene(
-        name="round column",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (c.A, c.B, 1.0)),
-        parameters={"P": Parameter(0.0), "A": Parameter(1.0), "B": Parameter(1.0)},
-        load="P",
-        ends=(clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P))),
-        ordinate=Ordinate("shortening", s=1.0, of=lambda r, q: 1 - r[2]),
-        span=(0.0, 45.0),
-    )
+    ends = clamped(), sliding(lambda c: (0.0, 0.0, None), force=lambda c: (0.0, 0.0, -c.P))
+    return replace(column().varying(B=1.0), ends=ends)
 
 
 def test_of_an_ordinate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
