@@ -74,6 +74,8 @@ TABLE = {
             "output/test_files.py output/test_formats.py hard/test_files_after_a_kill.py diagram/test_diagram.py"),
     },
     "rodfem/codim2/criteria.py": {
+        "the-sign-of-round-off-along-a-locus": (
+            "self.inertia.move(-self.inertia.tolerance)", "pass", "codim2/test_locus.py"),
         "differences-along-a-locus-by-the-bounds-alone": (
             "float(min(DIFFERENCE, room / 100 / plane.width[which]))", "DIFFERENCE", "codim2/test_locus.py"),
         "loci-count-what-is-nearest": (
@@ -161,8 +163,6 @@ TABLE = {
     "rodfem/continuation/singular.py": {
         "eigenvalues-have-the-units-of-loads": (
             "least[m if self.fold else m - k : m] /= units[0]", "least[m if self.fold else m - k :] /= units[0]", HARD),
-        "the-sign-of-round-off-along-a-locus": (
-            "self.inertia.move(-self.inertia.tolerance)", "pass", "codim2/test_locus.py"),
         "states-drift-along-null-vectors": (
             "rows[:, 0] -= at.Z.T @ at.b[:, 0]", "rows[:, 0] -= 0.0 * at.Z.T @ at.b[:, 0]",
             "continuation/test_unfolding.py"),
