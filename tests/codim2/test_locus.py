@@ -172,7 +172,7 @@ def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch, fold
     assert found.ended[1] == "share = 1, its bound"
     assert found.ended[0].startswith("the double eigenvalue vanishes: divergence near P = 17.06957")
     for (P, share), mu in list(zip(found.values, found.omega2, strict=True))[4::4]:
-        assert flutter(share, P + 0.01, mu + 0.1) == pytest.approx((P, mu), rel=1e-9, abs=1e-7)
+        assert flutter(P + 0.01, mu + 0.1, share=share) == pytest.approx((P, mu), rel=1e-9, abs=1e-7)
     P, share = found.values[0]
     assert np.cos(np.sqrt(P)) * (share - 1) == pytest.approx(share, abs=1e-9)
     assert np.isfinite(found.error[~np.isnan(found.error)]).all()
