@@ -16,11 +16,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FREQUENCY, KINDS
 from rodfem.modes.modes import RIGID
 from rodfem.output.pieces import Interval, intervals_of
+from rodfem.output.plot_diagram import dense
 from rodfem.output.style import HALO, PALETTE, STYLE, axis_label, explain, save, sheet
 from rodfem.output.words import mesh_in_words, rounded_up
 from rodfem.stability.soft_mode import STABLE
@@ -102,10 +104,27 @@ def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
     for special in found:
         here = float(special["load"]), abs(complex(special["omega2"])) ** 0.5
         axes.plot(*here, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
-        place = (8.0, 6.0) if here[1] else (0.0, 14.0)
-        text = axes.annotate(f"{special['load']:.6g}", here, place, textcoords="offset points")
-        text.set(path_effects=HALO, ha="left" if place[0] else "center", zorder=6)
+        text = axes.annotate(f"{special['load']:.6g}", here, (0.0, 14.0), textcoords="offset points", ha="center")
+        text.set(path_effects=HALO, zorder=6)
+        if here[1]:
+            _move_aside(axes, text)
     return {special["kind"] for special in found}
+
+
+def _move_aside(axes: Axes, text: Annotation) -> None:
+    """Move a text to the place to the right of its mark, or to the left, where it covers least of the curves."""
+    axes.get_xlim()  # before that the axes do not fit the curves
+    lines = [np.column_stack(np.broadcast_arrays(*line.get_data())).astype(float) for line in axes.lines]
+    whole = [places[np.isfinite(places).all(axis=1)] for places in lines]
+    curves = np.concatenate([dense(axes, places) for places in whole if len(places) > 1])
+
+    def covered(place: tuple[float, float]) -> int:
+        text.set(position=place, ha="left" if place[0] > 0 else "right")
+        box = text.get_window_extent()
+        return int(np.all((curves > box.min) & (curves < box.max), axis=1).sum())
+
+    beside = [(8.0, y) for y in (6.0, -18.0, 18.0, -30.0)]
+    covered(min([*beside, *((-x, y) for x, y in beside)], key=covered))
 
 
 # --- curves and ranges
