@@ -8,6 +8,9 @@ A combination ``g = sum_j a_j g_j`` of the generators of :mod:`rodfem.fem.symmet
 for all ``x``; and where it moves nothing that an end holds.  The space of such ``a`` is the null space of a matrix with
 rows for each of a number of generic states.
 
+What acts on the rod, with a potential, has to be invariant by itself: next to a rod 1e12 times as stiff as the spring
+that holds it, the spring is round-off in ``F``.
+
 The motion of a closed rod along itself is a symmetry where no equation has the arclength in it.  Where one has, it may
 still be one together with a rotation (a ring under a dead radial load): ``g``, with the state's derivative in it, has
 to leave the functional ``L`` invariant, ``dL(x)[g(x)] = 0``, on a fine mesh, which has such a symmetry up to its error.
@@ -74,7 +77,10 @@ def find_symmetries(equations: Equations) -> list[Symmetry]:
     # the round-off of wild states hides that of all others
     asked_at = np.flatnonzero(greatest <= 1e4 * greatest.min())
     conditions, magnitudes = np.vstack([rows[i] for i in asked_at]), np.max([sizes[i] for i in asked_at], axis=0)
-    basis = _moving(_kernel(free, conditions, magnitudes), moved)
+    nearly = 1e-6  # of these motions those are chosen that do not change what acts on the rod
+    moving = _moving(_kernel(free, conditions, magnitudes, nearly), moved)
+    keeping = moving @ _keeping_loads(equations, [Symmetry(w, parts) for w in moving.T])
+    basis = _moving(_kernel(keeping, conditions, magnitudes, INVARIANT), moved)
     return [Symmetry(w, parts) for w in simplest(basis).T]
 
 
@@ -88,11 +94,46 @@ def _moving(motions: np.ndarray, moved: np.ndarray) -> np.ndarray:
     return np.asarray(motions @ combinations[:, squares > EXACT])
 
 
-def _kernel(motions: np.ndarray, conditions: np.ndarray, magnitudes: np.ndarray) -> np.ndarray:
-    """Combinations of ``motions`` (m, n) that fulfil ``conditions`` (..., m), relative to the size of their terms."""
+def _kernel(motions: np.ndarray, conditions: np.ndarray, magnitudes: np.ndarray, exact: float) -> np.ndarray:
+    """Combinations of ``motions`` (m, n) that fulfil ``conditions`` (..., m), ``exact`` relative to their terms."""
     terms = abs(motions.T) @ magnitudes
     terms = np.where(terms > 0, terms, terms.max(initial=0.0) or 1.0)
-    return np.asarray(motions @ (_null_space(conditions @ motions / terms, INVARIANT) / terms[:, None]))
+    return np.asarray(motions @ (_null_space(conditions @ motions / terms, exact) / terms[:, None]))
+
+
+def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
+    """Combinations (found, number) of symmetries that were ``found`` by which what acts on the rod does not change.
+
+    Multipliers are zero, as they are as large as the forces of the rod.
+    """
+    if not found or equations.loads is None:
+        return np.eye(len(found))
+    states = [generic_state(equations, seed, no_multipliers=True) for seed in range(len(found) + 3)]
+    changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
+    lengths = abs(changes / equations.fields.sizes).max(axis=(0, 2))
+    lengths = np.where(lengths > 0, lengths, 1.0)
+    along = [_derivatives(state, change / lengths[:, None]) for state, change in zip(states, changes, strict=True)]
+    size = max(largest for _, largest in along)
+    if size == 0.0:
+        return np.eye(len(found))
+    round_off = 1e-8  # of the differences, relative to the potential
+    return np.asarray(_null_space(np.array([row for row, _ in along]) / size, round_off) / lengths[:, None])
+
+
+def _derivatives(state: NodalValues, changes: np.ndarray, step: float = 1e-3) -> tuple[np.ndarray, float]:
+    """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its largest value."""
+    equations, loads = state.equations, state.equations.loads
+    assert loads is not None
+    values = np.array(
+        [
+            [
+                NodalValues(equations, state.local + side * step * change, state.line).integral(loads)
+                for side in (-2, -1, 1, 2)
+            ]
+            for change in changes
+        ]
+    )
+    return values @ [1.0, -8.0, 8.0, -1.0] / (12 * step), float(abs(values).max())
 
 
 def find_motion_along(equations: Equations) -> Symmetry | None:
@@ -199,7 +240,7 @@ def _clamped(fields: Fields) -> np.ndarray:
     return used[fields.number[used] < 0]
 
 
-def generic_state(equations: Equations, seed: int, decay: float = 0.6) -> NodalValues:
+def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_multipliers: bool = False) -> NodalValues:
     """Generic state with a random load: the same on any number of ranks, ends held.
 
     Values are functions of the place along the rod, not of the numbering, with all Fourier coefficients, of which each
@@ -211,6 +252,7 @@ def generic_state(equations: Equations, seed: int, decay: float = 0.6) -> NodalV
     low, high = sorted(scene.span)
     local = fields.sizes * fields.filled(values)
     local[fields.copies[:, -1]] = low + (high - low) * part
+    local[fields.multipliers & no_multipliers] = 0.0
     for size in (1.0, 0.1, 0.01, 1e-3):  # of displacements: a barrier admits no large ones
         moved = local.copy()
         moved[fields.dofs.get("r", [])] *= size

@@ -189,7 +189,7 @@ def hinge(bending: float, spring: float) -> Scene:
 
 @pytest.mark.ranks
 @pytest.mark.long
-@pytest.mark.parametrize("bending", [*(pytest.param(b, marks=pytest.mark.alone) for b in (1.0, 1e6)), 1e9])
+@pytest.mark.parametrize("bending", [*(pytest.param(b, marks=pytest.mark.alone) for b in (1.0, 1e6, 1e12)), 1e9])
 def test_a_rotation_against_a_spring_is_no_symmetry(bending: float) -> None:
     """Beside 1e9 a spring of 1 was round-off in the functional, and the rod stable on its whole range, to P = 4."""
     system = Solver(hinge(bending, 0.5), Discretization(elements=3, degree=4)).equilibria.system
@@ -233,7 +233,7 @@ def test_an_eigenvalue_near_zero_is_no_rotation() -> None:
     )  # fmt: skip
     (branch,) = trace(rod, Discretization(elements=6, degree=4), Plan(depth=0))
     rows = [point for point in branch.points if 1 - point.load / pi**2 > LEAST]
-    assert max(point.load for point in rows) > pi**2 * (1 - 10 * LEAST)
+    assert max(point.load for point in rows) > pi**2 * (1 - 20 * LEAST)
     assert {(point.negative, point.zero) for point in rows} == {(0, 1)}
 
 
