@@ -194,9 +194,14 @@ class SymmetricSolver(PencilMatrices):
         def solved(b: np.ndarray) -> np.ndarray:
             return system.whole(self.factors.solve_all(b[own].reshape(-1, 1))[:, 0])
 
-        inverse, room = LinearOperator(mass.shape, solved, dtype=float), number + max(number, 6)
+        inverse, number = LinearOperator(mass.shape, solved, dtype=float), min(number, size - 1)
         tolerance = 1e-9  # of vectors: the error of the eigenvalues is the square
-        given = {"v0": system.whole(start.array_r), "ncv": min(room, size), "tol": tolerance, "maxiter": 300}
+        given = {
+            "v0": system.whole(start.array_r),
+            "ncv": min(number + max(number, 6), size),
+            "tol": tolerance,
+            "maxiter": 300,
+        }
         try:
             values, vectors = eigsh(inverse, number, mass, self.shift, OPinv=inverse, **given)
         except ArpackNoConvergence as trouble:
