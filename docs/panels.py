@@ -27,8 +27,6 @@ CLEAR = 18.0
 """Pixels between two numbers."""
 COUNT, IN_SPACE = "negative eigenvalues", " in the plane (in space)"
 """What numbers at curves are, in the legend."""
-FREQUENCIES = 3
-"""Left-most frequencies that are drawn."""
 ROOM, LEAST = 0.15, 1e-9
 """Share of the height that is kept free above and below, and pixels below which a curve has no direction."""
 
@@ -59,7 +57,7 @@ def draw(axes: Axes, found: Mapping[str, Any], signs: tuple[int, ...] = (1,), wi
                 style = {"mec": "black", "mew": 0.6 * width, "ms": 3 * width} | MARKERS[special["kind"]]
                 axes.plot(special["load"], sign * special["ordinate"], ls="none", zorder=5, **style)
     if waves := swept(found):
-        draw_into(axes, waves, FREQUENCIES)
+        draw_into(axes, waves)
         axes.set_xlabel(axis_label(found))
         return
     axes.margins(y=ROOM)
@@ -80,7 +78,7 @@ def legend_of(found: Mapping[str, Any]) -> list[Artist]:
     """Entries of a legend for what :func:`draw` draws of a diagram."""
     parts = [part for branch in found["branches"] for part in pieces(branch)]
     if waves := swept(found):
-        return draw_into(Figure().subplots(), waves, FREQUENCIES)
+        return draw_into(Figure().subplots(), waves)
     styles = {STABLE: "-", PLANAR: "--", UNSTABLE: ":"}
     kinds = {UNSTABLE if index else PLANAR if in_space else STABLE for _, index, in_space in parts}
     out: list[Artist] = [

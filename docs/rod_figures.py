@@ -156,6 +156,7 @@ def shape(axes: Axes, diagram: Diagram, branch: Branch, row: int) -> None:
             list(corners[:, :, :2]), facecolors=solid.color, edgecolors=solid.color, lw=0.3, zorder=3
         )
         axes.add_collection(shade)
+        axes.update_datalim(corners[:, :, :2].reshape(-1, 2))
     axes.autoscale_view()
     axes.set_aspect("equal")
     axes.margins(0.12)
