@@ -300,7 +300,7 @@ class SoftRows:
         """Make rows of special points that are zeros of the mesh, not of the rod."""
         singular = {id(s.point) for s in branch.special if s.kind.singular}
         rows = [p for p in branch.points if id(p) not in singular]  # with loads asked for, and the end
-        left_out = [_is_of_the_mesh(s, rows) for s in branch.special]
+        left_out = [s.kind.singular and _is_of_the_mesh(s, rows) for s in branch.special]
         for s in compress(branch.special, left_out):
             self._of(s.point.mesh).examine(s.point, fixed_load=False, compare=True, family=family)
         branch.special[:] = [s for s, out in zip(branch.special, left_out, strict=True) if not out]
@@ -358,13 +358,17 @@ def _is_of_the_mesh(special: SpecialPoint, rows: Sequence[Point]) -> bool:
     """
     first = sum(p.arclength < special.point.arclength for p in rows)
     before, after, number = rows[:first][::-1], rows[first:], 2 if isfinite(special.error_estimate) else 1
-    doubtful = any(sum(p.undecided > 0 for p in side[:number]) == number for side in (before, after))
     change = [(q.negative - p.negative, q.undecided - p.undecided) for p, q in zip(before[:1], after[:1], strict=False)]
-    doubtful = doubtful or (number == 1 and change == [(0, 0)])
+    doubtful = _open(before, number) or _open(after, number) or (number == 1 and change == [(0, 0)])
     (low, high), (least, most) = _bounds(before[:2]), _bounds(after[:2])
     differ = high < least or most < low
     own = special.negative_after - special.negative_before
-    return special.kind.singular and doubtful and not differ and change != [(own, 0)]
+    return doubtful and not differ and change != [(own, 0)]
+
+
+def _open(rows: Sequence[Point], number: int) -> bool:
+    """Whether each of a ``number`` of first rows is undecided."""
+    return sum(p.undecided > 0 for p in rows[:number]) == number
 
 
 def _bounds(rows: Sequence[Point]) -> tuple[float, float]:

@@ -77,6 +77,11 @@ def _exact(solver: BranchSolver, points: Sequence[Point], extra: int) -> int:
     return exact
 
 
+def _bounded(special: SpecialPoint) -> bool:
+    """Whether a special point has a bar, or is an end."""
+    return isfinite(special.error_estimate) or special.kind == END
+
+
 class Quadrature:
     """Examines branches on the meshes of several ``solvers``, and tells an ``observer`` what is left open."""
 
@@ -86,17 +91,16 @@ class Quadrature:
 
     def examine(self, branch: Branch) -> None:
         """Take the bars of points away where the equations are not integrated, mark rows on a kink, and say so."""
-        first = branch.points[: branch.parent is None]
-        asked = [s for s in branch.special if isfinite(s.error_estimate) or s.kind == END]
+        asked = [special for special in branch.special if _bounded(special)]
         found = [(s.point, self._without_bars(s, branch)) for s in asked if s.resolved is not False]
-        self._kinks(branch, [*first, *(special.point for special in asked)])
-        self._say(branch, [(point, words) for point, words in found if words and not point.kink])
+        self._kinks(branch, [*branch.points[: branch.parent is None], *(special.point for special in asked)])
+        self._say(branch, [(point, words) for point, words in found if not point.kink])
         none = "the ordinate is not a finite number, and perhaps at other loads: return one at every state."
-        self._say(branch, [(point, none) for point in branch.points if not isfinite(point.ordinate)])
+        self._say(branch, [(point, "" if isfinite(point.ordinate) else none) for point in branch.points])
 
     def _say(self, branch: Branch, found: Sequence[tuple[Point, str]]) -> None:
         """Say the first thing that was found."""
-        for point, words in found[:1]:
+        for point, words in [(point, words) for point, words in found if words][:1]:
             self.observer.warn(Remark(f"{branch.name}: at {self.load} = {point.load:.6g} {words}", point.load))
 
     def _without_bars(self, special: SpecialPoint, branch: Branch) -> str:

@@ -35,7 +35,7 @@ from rodfem import compat
 from rodfem.expressions import Variable, differentiated, extract_coefficients, extract_type
 from rodfem.fem.assembly import Assembler, Cells, Places
 from rodfem.fem.equations import Equations
-from rodfem.fem.state import NodalValues
+from rodfem.fem.state import NodalValues, State
 from rodfem.fem.system import System
 from rodfem.forms.kinematics import curvature
 from rodfem.linalg.matrices import EPS
@@ -214,8 +214,22 @@ class QuadratureCheck:
 
         The composite rule has a ``share`` of its points where functions of arclength are known to be integrated.
         """
-        state, elements = self.system.at(x), self.system.fields.discretization.elements
         number = max(LEAST, self._pieces.number // share)
+        found = self._found(self.system.at(x), number)
+        if not (every := [each for part in self.system.comm.allgather(found) for each in part]):
+            return ""
+        if share > 1:
+            return self(x)
+        _, (a, b, low, high) = max(every)
+        return (
+            f"the quadrature of the element from {a:.6g} to {b:.6g} does not integrate the equations about s = "
+            f"{(low + high) / 2:.6g}, within {high - low:.1g}: no error is estimated; use breaks=(...) where a "
+            "function jumps or has a kink, and shorter elements elsewhere."
+        )
+
+    def _found(self, state: State, number: int) -> list[tuple[float, Any]]:
+        """Errors over what is allowed, and their places, by a composite rule with a ``number`` of points."""
+        elements = self.system.fields.discretization.elements
         self.system.equations.take(state.line)
         values = [local[self._pieces.dofs] for local in (state.local, self._moved(state.local))]
         *coarse, fine = np.split(self._terms(values, 1, 2, 3, number), np.cumsum([1, 2, 3]), axis=1)
@@ -234,16 +248,7 @@ class QuadratureCheck:
                 if errors[cell] > 1:
                     parts = fine[term, :, cell, rows].T
                     found.append((errors[cell], self._place(values, term, cell, rows, parts, least[term])))
-        if not (every := [each for part in self.system.comm.allgather(found) for each in part]):
-            return ""
-        if share > 1:
-            return self(x)
-        _, (a, b, low, high) = max(every)
-        return (
-            f"the quadrature of the element from {a:.6g} to {b:.6g} does not integrate the equations about s = "
-            f"{(low + high) / 2:.6g}, within {high - low:.1g}: no error is estimated; use breaks=(...) where a "
-            "function jumps or has a kink, and shorter elements elsewhere."
-        )
+        return found
 
     def kink(self, x: PETSc.Vec) -> str:
         """Return what has a kink at the very state ``x``, as next to a support to one side: the equations, or nothing.
