@@ -240,7 +240,7 @@ def log(store: Store, scenes: int) -> str:
     return f"""# Log of the hard cases
 
 Written by `make bench` (`python -m benchmarks.robustness`) in {store.took() / 60:.0f} minutes on
-{machine()}; {versions("petsc4py", "numpy", "scipy")}; one thread; {strftime("%Y-%m-%d")}.
+{machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread; {strftime("%Y-%m-%d")}.
 
 Each case is a one-parameter family of problems with a closed form or a published value; `tests/hard` has them, and
 tests some values of each. It tests a row of [the contract](resolution.md). *Right*: what is promised, to the error bars

@@ -339,7 +339,7 @@ def introduction(store: Store, reached: str) -> str:
     return f"""# Every way to answer "is it stable?", and what it costs
 
 Written by `make bench` (`python -m benchmarks.stability`) in {store.took() / 60:.0f} minutes on
-{machine()}; {versions("petsc4py", "numpy", "scipy")}; one thread;
+{machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread;
 load of the machine between {low:.1f} and {high:.1f}.
 
 The state is the straight telephone cord at lam = {LOAD:g}; {NUMBER} left-most eigenvalues are asked for. A time is the

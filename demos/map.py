@@ -43,7 +43,11 @@ def main(couplings: np.ndarray, output: Path) -> None:
     """Compute what is missing in the folder ``output``, and draw the map."""
     report, plan = Report(), Plan(depth=0, error_bars=False)
     found = rodfem.family(
-        rod, {"A": couplings}, output, plan, progress=lambda done, count: report.say(f"  {done} of {count} rods")
+        rod,
+        {"A": couplings.tolist()},
+        output,
+        plan,
+        progress=lambda done, count: report.say(f"  {done} of {count} rods"),
     )
     for sentence in filter(None, found.trouble.values.tolist()):
         report.warn(sentence)

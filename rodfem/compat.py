@@ -221,6 +221,21 @@ def compilation() -> Iterator[None]:
         root.setLevel(level)
 
 
+@contextmanager
+def slepc_errors() -> Iterator[None]:
+    """Have the errors of SLEPc's functions raised as :class:`PETSc.Error`.
+
+    Where petsc4py's check is compiled to another convention (3.25.1 on Debian sid) slepc4py sets the exception and
+    returns a value all the same: Python makes a SystemError of that, with the exception as its cause.
+    """
+    try:
+        yield
+    except SystemError as trouble:
+        if isinstance(trouble.__cause__, PETSc.Error):
+            raise trouble.__cause__ from None
+        raise
+
+
 def destroy_garbage(comm: Any) -> None:
     """Destroy the PETSc objects that Python has collected, as PETSc does not since 3.18; collective over ``comm``."""
     if hasattr(PETSc, "garbage_cleanup"):

@@ -1,7 +1,7 @@
 """Recorded indices of every row of every demo, classical problem and scene of the documentation, by other methods.
 
 ``python -m tests.every_row`` examines all conservative scenes, or those named, by :data:`WITNESSES`: two shifts of the
-same factors, the spectrum by ARPACK, and the paper's reduction to the null space of the constraints with MUMPS.  It
+same factors, the spectrum by SLEPc, and the paper's reduction to the null space of the constraints with MUMPS.  It
 takes some minutes, and prints a line a scene.
 """
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.common import MPIRUN, ROOT, environment
 
-HEAVY = ("numpy", "scipy.sparse", "mpi4py.MPI", "petsc4py.PETSc")
+HEAVY = ("numpy", "scipy.sparse", "mpi4py.MPI", "petsc4py.PETSc", "slepc4py.SLEPc")
 PROCESSES = {"hemitropic": 1.2, "cord": 1.2, "ruler": 1.2, "ring": 1.8}
 """Demos, and the seconds that are aimed at."""
 IMPORTS = (*HEAVY, "rodfem.forms", "rodfem.compat", "h5py", "rodfem.app.run")

@@ -126,7 +126,7 @@ def write(store: Store, path: Path) -> None:
 def write_log(store: Store, path: Path) -> None:
     """Write everything that was measured."""
     low, high = store.loads()
-    found = versions("fenics-dolfinx", "petsc4py", "numpy", "scipy")
+    found = versions("fenics-dolfinx", "petsc4py", "slepc4py", "numpy", "scipy")
     runs = max((r["runs"] for r in store.rows("branches")), default=1)
     lines = [
         "# Log of the speed measurements",

@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 from rodfem.errors import ConvergenceError, InputError, SetupError
 from rodfem.ranks import all_come, in_words, listen
 
-NEEDED = ("ufl", "dolfinx", "petsc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
+NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
 
 if missing := [name for name in NEEDED if find_spec(name) is None]:

@@ -74,7 +74,7 @@ def parser_of(statement: Statement, usual: Scene, program: str) -> Parser:
         prog=program,
         description=statement.words,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="Options for PETSc go after a lone --, as in: -- -log_view",
+        epilog="Options for PETSc and SLEPc go after a lone --, as in: -- -log_view",
     )
     add_options(parser, usual.load, Path("results") / usual.name)
     taken = {action.dest for action in parser._actions} | set(parser._option_string_actions)
@@ -264,7 +264,7 @@ def add_options(parser: Parser, load: str, output: Path) -> None:
     add("--most-branches", type=int, metavar="N", help=words)
     words = "bound the errors by a second computation on a richer mesh (default)"
     add("--error-bars", action=argparse.BooleanOptionalAction, default=None, help=words)
-    words = "also compute the K left-most eigenvalues of every state"
+    words = "also compute the K left-most eigenvalues of every state with SLEPc"
     add("--spectrum", type=int, metavar="K", help=words)
     words = "judge the states at the loads of --at, and print all that is said, by "
     add("--method", metavar="NAME", help=words + ", ".join((AUTO, *METHODS)))

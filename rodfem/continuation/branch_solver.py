@@ -382,7 +382,7 @@ class BranchSolver:
         )
 
     def _leftmost(self, x: PETSc.Vec, index: Index) -> list[float]:
-        """Left-most eigenvalues, if asked for; :class:`ConvergenceError` where they contradict the inertia."""
+        """Left-most eigenvalues by SLEPc, if asked for; :class:`ConvergenceError` where they contradict the inertia."""
         if not self.modes:
             return []
         modes = self.spectrum.at(x).leftmost(self.modes)
@@ -390,7 +390,7 @@ class BranchSolver:
         least, most = (int((modes.values < at).sum()) for at in (-tolerance, tolerance))
         if not least <= min(index.negative, self.modes) <= most or not modes.certified:
             raise ConvergenceError(
-                f"ARPACK finds {least} negative eigenvalues at "
+                f"SLEPc finds {least} negative eigenvalues at "
                 f"{self.system.scene.load} = {self.system.scalar(x):.8g}, the inertia "
                 f"{index.negative}: ask for more eigenvalues, or use a richer discretisation."
             )

@@ -18,6 +18,8 @@ from rodfem.tolerances import TINY
 
 Sizes = Callable[[], PETSc.Vec]
 """Natural sizes of the unknowns of a matrix, asked for when it is factored."""
+PETSC_ERR_LIB = 76
+"""PETSc's error code for a failure in a library below."""
 PIVOT = 1e-3
 """Threshold of the pivots of LDL^t, relative to the largest entry of a column."""
 LONG = 20_000

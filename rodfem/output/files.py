@@ -107,10 +107,13 @@ def origin() -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the libraries that compute, each by its name in lower case."""
+    from slepc4py import SLEPc  # after what compat loads first
+
     return {
         "python": platform.python_version(),
         "dolfinx": compat.dolfinx.__version__,
         "petsc": ".".join(map(str, compat.PETSc.Sys.getVersion())),
+        "slepc": ".".join(map(str, SLEPc.Sys.getVersion())),
         "numpy": np.__version__,
     }
 

@@ -15,10 +15,13 @@ from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
+from slepc4py import SLEPc
 
+from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError, InputError, many
 from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
+from rodfem.linalg.factorization import PETSC_ERR_LIB, ordering, preferred
 from rodfem.linalg.matrices import gathered
 from rodfem.ranks import as_failure
 from rodfem.stability import AUTO, METHODS, find
@@ -28,7 +31,7 @@ from rodfem.stability.near_zero import Decision, decide
 from rodfem.stability.nonsymmetric import Frequencies, NonsymmetricSolver
 from rodfem.stability.soft_mode import ONE_SIDE, WORDS, SoftMode, is_stable, stability
 from rodfem.stability.spectrum import FINITE, Spectrum
-from rodfem.stability.symmetric import Eigenvalues, SymmetricSolver
+from rodfem.stability.symmetric import Eigenvalues, SymmetricSolver, eigensolver
 
 COUNT, DENSE = "count", "dense"
 """Methods that find no eigenvalues, and all there are."""
@@ -259,7 +262,7 @@ class Count(SymmetricMethod):
 
 
 class ShiftInvert(Method):
-    """ARPACK on the singular pencil: one sparse factorisation serves eigenvalues and count."""
+    """SLEPc on the singular pencil: one sparse factorisation serves eigenvalues and count."""
 
     def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
         """By the Lanczos method, with a shift below the spectrum."""
@@ -309,14 +312,63 @@ def _nearest(found: Frequencies, number: int) -> Eigenvalues:
 
 
 class Slicing(SymmetricMethod):
-    """All eigenvalues in an interval from below the spectrum: as many as counts at its ends say, in slices of them."""
+    """SLEPc's spectrum slicing: all eigenvalues in an interval, found by counting, with the left-most and few more."""
 
     def leftmost(self, x: PETSc.Vec, number: int) -> Eigenvalues:
-        """Those in the least interval, each twice as wide as the one before, that has as many."""
-        pencil = self.work.low_pencil(x)
-        low, width = pencil.shift, max(abs(pencil.shift), pencil.scale) * 1.0371  # no end is an eigenvalue, likely
-        while (inside := pencil.eigenvalue_count(low + width)) < number:
+        """Those in an interval from below the spectrum."""
+        pencil, own = self.work.low_pencil(x), self.work.symmetric
+        # no simple factor: an end on an eigenvalue is unlikely
+        low, width = own.shift, max(abs(own.shift), own.scale) * 1.0371
+        while pencil.eigenvalue_count(low + width) < number:
             width *= 2
-        found = pencil.leftmost(inside)
-        values, vectors, errors = found.values[:number], found.vectors[:number], found.errors[:number]
-        return Eigenvalues(values, vectors, errors, found.certified)
+        high = low + width
+        for wider in (0.0, 1e-9, 1e-7, 1e-5):  # an end on an eigenvalue is moved off it
+            low, high = low - wider * (high - low), high + wider * (high - low)
+            if (solver := sliced(pencil, low, high)) is not None:
+                break
+        else:
+            raise ConvergenceError(f"{low:.6g} or {high:.6g} is an eigenvalue: choose another method.")
+        complete = solver.getConverged() == pencil.eigenvalue_count(high) - pencil.eigenvalue_count(low)
+        values, vectors = pencil.converged(solver, number)
+        solver.destroy()
+        errors = pencil.backward_errors(values, vectors)
+        return Eigenvalues(
+            self.work.one * values, pencil.unscaled(vectors), errors, complete, 3
+        )  # SLEPc's own, at least
+
+
+def sliced(pencil: SymmetricSolver, low: float, high: float) -> SLEPc.EPS | None:
+    """Eigenvalues of a ``pencil`` between ``low`` and ``high``; None if they do not match the counts at these ends."""
+    rooms = 100, 400, 1600  # where rotations have no mass many pivots of the pencil are delayed
+    for room in rooms:
+        try:
+            solver = in_interval(*pencil.scaled, low, high, room)
+            with slepc_errors():
+                solver.solve()
+        except PETSc.Error as trouble:
+            if trouble.ierr == 77:  # PETSC_ERR_PLIB: what it finds does not match the counts at the ends
+                break
+            if trouble.ierr != PETSC_ERR_LIB or room == rooms[-1]:
+                raise
+        else:
+            return solver
+    return None
+
+
+def in_interval(matrix: PETSc.Mat, mass: PETSc.Mat, low: float, high: float, room: int = 100) -> SLEPc.EPS:
+    """Spectrum slicing for all eigenvalues between two; MUMPS has ``room`` beyond its estimate, a percentage."""
+    solver = eigensolver(matrix, mass, "rodfem_slicing_")
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.ALL)
+    solver.setInterval(low, high)
+    solver.setTolerances(tol=1e-10)  # of vectors
+    solver.getST().setMatStructure(PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    with slepc_errors():
+        solver.setFromOptions()
+        ksp = solver.getKrylovSchurKSP()  # that of the solver for one slice
+        ksp.setType("preonly")
+        ksp.getPC().setType("cholesky")
+        ksp.getPC().setFactorSolverType("mumps")
+        controls = {"mat_mumps_icntl_8": 0, "mat_mumps_icntl_13": 1, "mat_mumps_icntl_14": room}
+        with preferred(ksp.getOptionsPrefix(), ordering(matrix) | controls):
+            solver.setUp()
+    return solver

@@ -8,7 +8,7 @@ With a shift ``a``
 has all finite eigenvalues: ``x = (S - a M)^-1 L w / nu`` and ``w = R^t x``.  Massless unknowns, multipliers and
 constraints are eliminated by as many solves as ``L`` has columns.  Directions with mass that the constraints hold have
 ``nu = 0``, in no Jordan blocks: round-off leaves them as small as it is, and finite eigenvalues are distinct from them
-down to there.  LAPACK finds all eigenvalues of ``T``; of a large ``T`` ARPACK finds the greatest.
+down to there.  LAPACK finds all eigenvalues of ``T``; of a large ``T`` SLEPc finds the greatest.
 
 Round-off ``dT`` moves a simple eigenvalue by up to ``|dT| |z|`` for its right and left vectors ``w`` and ``z``, with
 ``|w| = 1`` and ``z.w = 1``, and one of two that meet by no more than ``(|dT| |T|)^(1/2)``, where ``z`` has no bound
@@ -23,11 +23,13 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
+from petsc4py import PETSc
 from scipy.linalg.lapack import dpstrf
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
+from scipy.sparse.linalg import splu
+from slepc4py import SLEPc
 
+from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
-from rodfem.linalg.orthogonal import generic
 from rodfem.tolerances import TINY
 
 SHIFT = -10.0
@@ -45,7 +47,7 @@ FINITE = 1e-13
 ROUNDED = 1e-14
 """Round-off of ``T``, over the norms of its factors: of free rods on six elements 1.2e-14 of its norm is seen."""
 TOLERANCE = 1e-13
-"""Relative tolerance of ARPACK."""
+"""Relative tolerance of SLEPc."""
 
 Solve = Callable[[np.ndarray], np.ndarray]
 Matrix: TypeAlias = np.ndarray | sp.csr_matrix
@@ -158,7 +160,7 @@ class Spectrum:
     def greatest(self, number: int, *, left: bool = False) -> Eigenpairs:
         """The ``number`` greatest of ``T``, or of ``T^t`` (``left``), or all finite ones if these are fewer.
 
-        By LAPACK where it costs no more, or ARPACK gives up.
+        By LAPACK where it costs no more, or SLEPc gives up: at times it cannot sort equal complex ones.
         """
         if self.rank > max(80, 3 * number):
             try:
@@ -169,7 +171,7 @@ class Spectrum:
         return (self.pairs._replace(right=self.pairs.left.T) if left else self.pairs).at(slice(number))
 
     def _nearest(self, number: int, *, left: bool) -> Eigenpairs:
-        """The same by ARPACK; raises :class:`ConvergenceError` where it gives up."""
+        """The same by SLEPc; raises :class:`ConvergenceError` where it gives up."""
         first, last, solve = self.lower, self.dual, self.solve
         if left:
             first, last, solve = self.dual, self.lower, self.solve_transposed
@@ -277,16 +279,48 @@ def times(matrix: Matrix, w: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(matrix @ parts).view(complex)
 
 
+class _Operator:
+    """A real matrix that is known by its products, as PETSc's python matrices ask for it."""
+
+    def __init__(self, apply: Solve) -> None:
+        self.apply = apply
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """``y = T x``."""
+        values = x.array_r
+        y.array[:] = self.apply(values.real)
+        if np.iscomplexobj(values):
+            y.array[:] += 1j * self.apply(values.imag)
+
+
 def krylov(apply: Solve, size: int, number: int, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The ``number`` greatest eigenvalues, and vectors, of a real matrix (``size``, ``size``) known by ``apply``."""
-    if size <= 3 * number:  # of so few LAPACK has all
-        nu, vectors = np.linalg.eig(np.stack([apply(e) for e in np.eye(size)], axis=1))
-        greatest = np.argsort(-abs(nu), kind="stable")[:number]
-        return nu[greatest], vectors[:, greatest]
-    operator = LinearOperator((size, size), apply, dtype=float)
-    first, vectors = generic(np.arange(size)) if start is None else start, min(2 * number + 20, size)
+    matrix = PETSc.Mat().createPython((size, size), _Operator(apply), comm=PETSc.COMM_SELF)
+    matrix.setUp()
+    solver = SLEPc.EPS().create(PETSc.COMM_SELF)
+    solver.setOptionsPrefix("rodfem_")
+    solver.setOperators(matrix)
+    solver.setProblemType(SLEPc.EPS.ProblemType.NHEP)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_MAGNITUDE)
+    solver.setDimensions(number, min(2 * number + 20, size))
+    solver.setTolerances(tol=TOLERANCE, max_it=300)
+    solver.setFromOptions()
+    re, im = matrix.createVecs()
+    if start is not None:
+        re.array[:] = start
+        solver.setInitialSpace([re])
     try:
-        found: tuple[np.ndarray, np.ndarray] = eigs(operator, number, v0=first, ncv=vectors, tol=TOLERANCE, maxiter=300)
-    except ArpackError as trouble:
-        raise ConvergenceError(f"ARPACK found no eigenvalues ({trouble}): use another mesh.") from trouble
-    return found
+        with slepc_errors():
+            solver.solve()
+    except PETSc.Error as trouble:
+        why = str(trouble).splitlines()[-1]
+        raise ConvergenceError(f"SLEPc found no eigenvalues ({why}): use another mesh.") from trouble
+    nu, columns = list[complex](), list[np.ndarray]()
+    for i in range(solver.getConverged()):
+        nu.append(complex(solver.getEigenpair(i, re, im)))
+        columns.append(re.array_r + (0.0 if np.iscomplexobj(re.array_r) else 1j * im.array_r))
+    solver.destroy()
+    matrix.destroy()
+    if not nu:
+        raise ConvergenceError("SLEPc found no eigenvalue: use a richer discretisation.")
+    return np.array(nu), np.stack(columns, axis=1)

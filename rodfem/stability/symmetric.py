@@ -1,10 +1,10 @@
-"""Left-most eigenvalues of an equilibrium by ARPACK, on the singular pencil of its saddle matrix.
+"""Left-most eigenvalues of an equilibrium by SLEPc, on the singular pencil of its saddle matrix.
 
     (K C; C^t 0) x = mu (M 0; 0 0) x
 
 with ``M`` the kinetic metric: stable where all ``mu = omega^2`` are positive (Kumar & Healey 2010, (21) and (45)).
 ``M`` is singular, so that only shift-invert is free of spurious eigenvalues: ``(S - sigma M)^-1 M`` is zero on all that
-has no inertia.  A symmetry mode, of eigenvalue zero, is excluded by the constraint ``g.Mx = 0``.
+has no inertia.  A symmetry mode, of eigenvalue zero, is excluded by the constraint ``g.Mx = 0`` and by deflation.
 
 The shift is below the spectrum: the nearest eigenvalues to it are the left-most ones.  A count just above the last of
 them proves that none is missing, wherever the shift was.  All is in units of natural sizes, but for the modes that are
@@ -18,11 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigsh
+from slepc4py import SLEPc
 
+from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.chain import factors_of
-from rodfem.linalg.matrices import gathered, places_in, shared
+from rodfem.linalg.factorization import Factors
+from rodfem.linalg.matrices import places_in, shared
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.pencil import (
     PencilMatrices,
@@ -69,6 +71,7 @@ class SymmetricSolver(PencilMatrices):
         self.scaled, self._shifted, self._factored = (self.matrix, self.mass), self.system.state_matrix(), np.nan
         self.scale = scale_in_units(self.system)
         self.shift, self.factorisations, self.last = -self.scale, 0, np.zeros(0)
+        self.deflated: list[PETSc.Vec] = []
         self._places: np.ndarray | None = None
         self._drifts = 0
 
@@ -78,8 +81,11 @@ class SymmetricSolver(PencilMatrices):
         with system.clock("assembly"):
             modes = symmetry_modes(system, x)
             assemble_pencil(system, x, self.matrix, self.mass)
-            exclude_modes(system, modes, self.matrix, self.mass)
+            self.deflated = exclude_modes(system, modes, self.matrix, self.mass)
             self.scaled = in_units(system, self.matrix, self.mass, self.sizes)
+            if not system.scene.units.ordinary:
+                for mode in self.deflated:
+                    mode.pointwiseDivide(mode, self.sizes)
         self._factored, self._drifts = np.nan, system.phase.count
         return self
 
@@ -114,7 +120,7 @@ class SymmetricSolver(PencilMatrices):
         assert modes is not None
         if len(modes.values) < number:
             raise ConvergenceError(
-                f"ARPACK found {len(modes.values)} of the {number} eigenvalues asked for: ask for fewer, or use a "
+                f"SLEPc found {len(modes.values)} of the {number} eigenvalues asked for: ask for fewer, or use a "
                 "richer discretisation."
             )
         spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()  # equal ones have none
@@ -171,7 +177,7 @@ class SymmetricSolver(PencilMatrices):
         if not self.factors.regular:
             self.shift -= self.scale
             return self._solve(number, extra)
-        values, vectors, errors = self._lanczos(number, number + extra)
+        values, vectors, errors = self._krylov_schur(number, number + extra)
         reach = max(values[-1] - self.shift, self.scale) if len(values) else np.inf
         if len(values) and values[0] - self.shift < HIT * reach:
             self.shift -= reach
@@ -183,46 +189,62 @@ class SymmetricSolver(PencilMatrices):
         known = int((values < cut).sum())
         return Eigenvalues(values[:number], vectors[:number], errors[:number], self.eigenvalue_count(cut) == known)
 
-    def _lanczos(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
+    def _krylov_schur(self, least: int, number: int) -> tuple[np.ndarray, list[PETSc.Vec], np.ndarray]:
         """``number`` eigenvalues or all there are, with vectors and backward errors, without what is no eigenpair."""
-        system, own, mass = self.system, slice(*self.matrix.getOwnershipRange()), gathered(self.scaled[1])
-        start, size = self.inertia.seed(1), mass.shape[0]
+        start = self.inertia.seed(1)
         if len(self.last):
-            start.scale(1e-6 / system.norm(start))  # a space that is invariant already would miss all else
+            start.scale(1e-6 / self.system.norm(start))  # a space that is invariant already would miss all else
             start.array[:] += self.last
-
-        def solved(b: np.ndarray) -> np.ndarray:
-            return system.whole(self.factors.solve_all(b[own].reshape(-1, 1))[:, 0])
-
-        inverse, number = LinearOperator(mass.shape, solved, dtype=float), min(number, size - 1)
-        tolerance = 1e-9  # of vectors: the error of the eigenvalues is the square
-        given = {
-            "v0": system.whole(start.array_r),
-            "ncv": min(number + max(number, 6), size),
-            "tol": tolerance,
-            "maxiter": 300,
-        }
-        try:
-            values, vectors = eigsh(inverse, number, mass, self.shift, OPinv=inverse, **given)
-        except ArpackNoConvergence as trouble:
-            values, vectors = trouble.eigenvalues, trouble.eigenvectors
-        except (ArpackError, ValueError) as trouble:
+        solver = self.eigensolver(number, start)
+        with slepc_errors():
+            solver.solve()
+        values, vectors = self.converged(solver, number)
+        found = solver.getConverged()
+        solver.destroy()
+        if found < least:
             raise ConvergenceError(
-                f"ARPACK found no eigenvalues ({trouble}): use a richer discretisation."
-            ) from trouble
-        if len(values) < least:
-            raise ConvergenceError(
-                f"ARPACK found {len(values)} of the {least} eigenvalues asked for: ask for fewer, or use a richer "
+                f"SLEPc found {found} of the {least} eigenvalues asked for: ask for fewer, or use a richer "
                 "discretisation."
             )
-        order = np.argsort(values)
-        values, vectors = values[order], vectors[:, order]
         # purified: (mu - sigma) (S - sigma M)^-1 M x has no arbitrary massless parts
-        found = system.vectors(self.factors.solve_all((mass @ vectors)[own]) * (values - self.shift))
-        errors = self.backward_errors(values, found)
-        stiffness, weight = self._norms()
-        true = [i for i in range(len(values)) if errors[i] * (1 + abs(values[i]) * weight / stiffness) < CONVERGED]
-        return values[true], [found[i] for i in true], errors[true]
+        right = np.stack([(self.scaled[1] * vector).array_r.real for vector in vectors], axis=1)
+        for value, vector, column in zip(values, vectors, self.factors.solve_all(right).T, strict=True):
+            vector.array[:] = (value - self.shift) * column
+        errors = self.backward_errors(values, vectors)
+        stiffness, mass = self._norms()
+        true = [i for i in range(len(values)) if errors[i] * (1 + abs(values[i]) * mass / stiffness) < CONVERGED]
+        return values[true], [vectors[i] for i in true], errors[true]
+
+    def converged(self, solver: SLEPc.EPS, number: int) -> tuple[np.ndarray, list[PETSc.Vec]]:
+        """The ``number`` left-most eigenvalues, or all, that a ``solver`` has found, and their vectors."""
+        values = np.array([solver.getEigenvalue(i).real for i in range(solver.getConverged())])
+        order = np.argsort(values)[:number]
+        vectors = [self.system.new_vector() for _ in order]
+        for i, vector in zip(order, vectors, strict=True):
+            solver.getEigenvector(int(i), vector)
+        return values[order], vectors
+
+    def eigensolver(self, number: int, start: PETSc.Vec) -> SLEPc.EPS:
+        """Set up shift-invert for the ``number`` eigenvalues nearest to the shift that was factored."""
+        solver = eigensolver(*self.scaled, "rodfem_")
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+        solver.setTarget(self.shift)
+        # in a Krylov space with fewer vectors restarts cost more
+        solver.setDimensions(number, number + max(number, 6))
+        solver.setTolerances(tol=1e-9, max_it=300)  # of vectors: the error of the eigenvalues is the square
+        solver.setPurify(False)
+        solver.setInitialSpace([start])
+        if self.deflated:
+            solver.setDeflationSpace(self.deflated)
+        transform = solver.getST()
+        transform.setMatMode(SLEPc.ST.MatMode.SHELL)  # the shifted matrix is never formed
+        ksp = transform.getKSP()
+        ksp.setType("preonly")
+        ksp.getPC().setType("python")
+        ksp.getPC().setPythonContext(_Inverse(self.factors))
+        with slepc_errors():
+            solver.setFromOptions()
+        return solver
 
     def _norms(self) -> list[float]:
         """Sizes of stiffness and mass."""
@@ -236,3 +258,24 @@ class SymmetricSolver(PencilMatrices):
             residual = S * vector - M * vector * value
             errors.append(residual.norm() / ((stiffness + abs(value) * mass) * vector.norm()))
         return np.array(errors)
+
+
+def eigensolver(matrix: PETSc.Mat, mass: PETSc.Mat, prefix: str) -> SLEPc.EPS:
+    """Krylov-Schur solver with shift-invert for the symmetric pencil ``matrix - mu mass``, the mass semidefinite."""
+    solver = SLEPc.EPS().create(matrix.comm)
+    solver.setOptionsPrefix(prefix)
+    solver.setOperators(matrix, mass)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    solver.getST().setType(SLEPc.ST.Type.SINVERT)
+    return solver
+
+
+class _Inverse:
+    """Python context of a PETSc preconditioner that solves with factors made elsewhere."""
+
+    def __init__(self, factors: Factors) -> None:
+        self.factors = factors
+
+    def apply(self, pc: PETSc.PC, b: PETSc.Vec, z: PETSc.Vec) -> None:
+        """Solve for ``z``."""
+        self.factors.solve(b, z)

@@ -27,7 +27,7 @@ def test_versions_are_those_of_the_libraries(capsys: pytest.CaptureFixture[str])
     """Against what their C headers and the package's metadata say."""
     console.main(["--version"])
     said = dict(line.split() for line in capsys.readouterr().out.splitlines())
-    assert list(said) == ["rodfem", "python", "dolfinx", "petsc", "numpy"]
+    assert list(said) == ["rodfem", "python", "dolfinx", "petsc", "slepc", "numpy"]
     assert said["numpy"] == metadata.version("numpy") and said["rodfem"] == rodfem.__version__
     petsc = Path(petsc4py.get_config()["PETSC_DIR"])
     header = petsc / "include" / "petscversion.h"

@@ -8,11 +8,15 @@ from pathlib import Path
 
 import demo_cases
 import pytest
+from petsc4py import PETSc
+from slepc4py import SLEPc
 
 import rodfem
 from rodfem.app import console
 from rodfem.app.main import Statement
 from rodfem.app.persons_file import load
+from rodfem.compat import slepc_errors
+from rodfem.ranks import in_words
 
 SCENE = """
 from rodfem.forms.energy import bending_and_twist
@@ -144,3 +148,14 @@ def test_what_stands_beside_a_file_hides_no_module(tmp_path: Path, monkeypatch: 
 def test_constants_of_the_demos_are_described(name: str) -> None:
     statement = Statement(getattr(demo_cases.module(name), demo_cases.FUNCTIONS[name]))
     assert statement.constants and all(constant.words for constant in statement.constants)
+
+
+def test_an_option_that_slepc_refuses_is_one_sentence() -> None:
+    options = PETSc.Options()
+    options["refused_eps_type"] = "nonsense"
+    solver = SLEPc.EPS().create()
+    solver.setOptionsPrefix("refused_")
+    with pytest.raises(PETSc.Error) as refused, slepc_errors():
+        solver.setFromOptions()
+    options.delValue("refused_eps_type")
+    assert "nonsense): use smaller steps, another discretisation, or other options" in in_words(refused.value)

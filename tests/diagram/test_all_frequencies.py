@@ -53,11 +53,11 @@ def test_against_qz(name: str, part: float) -> None:
         assert abs(nu[:, None] - all_others).min(axis=1).max() < 1e-9 * abs(nu).max()
 
 
-def test_arpack_may_give_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Up to a rank of a thousand LAPACK finds all."""
+def test_slepc_may_give_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At times it cannot sort equal complex eigenvalues: up to a rank of a thousand LAPACK finds them."""
 
     def giving_up(*_: object) -> None:
-        raise ConvergenceError("ARPACK gives up.")
+        raise ConvergenceError("SLEPc cannot sort.")
 
     solver = Solver(classics.beck(), Discretization("pointwise", 8, 6)).equilibria
     spectrum = NonsymmetricSolver(solver.system).at(at_load(solver, solver.start(10.0), 10.0)).spectrum

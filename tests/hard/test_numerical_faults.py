@@ -133,12 +133,12 @@ def test_no_error_is_estimated_where_memory_is_exhausted(monkeypatch: pytest.Mon
 @pytest.mark.versions
 @pytest.mark.parametrize(
     "fault",
-    [pytest.param(lambda: ConvergenceError("ARPACK found none."), marks=pytest.mark.alone), lambda: PETSc.Error(76)],
+    [pytest.param(lambda: ConvergenceError("SLEPc found none."), marks=pytest.mark.alone), lambda: PETSc.Error(76)],
 )
 def test_a_sweep_keeps_what_it_has(
     fault: Callable[[], Exception], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Rows that ARPACK has certified before it fails, and no other: where nothing is proved."""
+    """Rows that SLEPc has certified before it fails, and no other: where nothing is proved."""
     rod, mesh, calls = demo_cases.scene("follower"), rodfem.Discretization("auto", 6, 3), [0]
     whole = rodfem.trace(rod, mesh, rodfem.Plan(error_bars=False))[0].points
 
