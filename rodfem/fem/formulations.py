@@ -170,6 +170,10 @@ class Formulation:
         """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`rodfem.forms.lagrangian`."""
         return lagrangian.pointwise(W, along.R, along.v, along.dr, equations.unknowns.n)
 
+    def dead_forces(self, equations: Equations, along: Place) -> list[Any]:
+        """Integrands of the potential of dead forces at the ends, if no term of an end has it."""
+        return []
+
     def contact_force(self, equations: Equations) -> list[Any]:
         """Components of the contact force in space (3,)."""
         return [equations.unknowns.n[i] for i in range(3)]
@@ -241,6 +245,11 @@ class Reduced(Formulation):
         left, right = (self._end(equations, equations.constants, side) for side in range(2))
         chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
         return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / equations.length)
+
+    def dead_forces(self, equations: Equations, along: Place) -> list[Any]:
+        """Those of the components of the contact force which they prescribe: ``-n.r'``."""
+        known, slope = [equations.fields.scene.known_force(i, equations.constants) for i in range(3)], along.R * along.v
+        return [-n * slope[i] for i, n in enumerate(known) if n is not None and n != 0]
 
     def contact_force(self, equations: Equations) -> list[Any]:
         """Unknown scalars, and what dead forces prescribe."""
