@@ -7,7 +7,7 @@ last row is.
 *Tangent and index of a regular point* are those of one symmetric factorisation at that state.  With ``F_lam``, the
 derivative of the equations in the load, ``z = (-S^-1 F_lam, 1)`` is a tangent, and the inertia of the factors of the
 saddle matrix ``S`` is the index (:mod:`rodfem.stability.inertia`).  ``S`` is singular at a fold, and a count says
-nothing about eigenvalues within its tolerance: both show in the same solves.  Of vectors ``v``, generic ones and
+nothing about eigenvalues within its tolerance: both show in the same solves.  Of vectors ``v``, a generic one and
 the border of the branch (:mod:`rodfem.stability.reduced_stiffness`), the least ``|v| / |S^-1 M v|`` is an upper bound
 of the distance of the nearest eigenvalue from zero, and an estimate as good as they are rich in its vector.  If that is
 too near zero, the tangent is by LU factors of the bordered matrix, and two shifts count.
@@ -50,8 +50,6 @@ ALIGNED = 0.9
 """Least cosine between the direction of a prediction and the tangent at the corrected point."""
 ROWS = 4
 """Rows of a branch that a prediction extrapolates, at most."""
-BLOCK = 2
-"""Number of generic vectors that show a singular state."""
 
 
 class Knot(Protocol):
@@ -162,7 +160,7 @@ class RegularPoints:
 
     def __init__(self, inertia: Inertia) -> None:
         self.inertia, self.system = inertia, inertia.system
-        generic = np.stack([inertia.seed(i).array_r.real for i in range(BLOCK)], axis=1)
+        generic = inertia.seed(0).array_r[:, None]
         self._generic = inertia.weighed(generic / inertia.sizes(generic))
         self._state: tuple[State | None, Phase | None, float] = None, None, 0.0
         self._found: RegularPoint | None = None
@@ -183,7 +181,7 @@ class RegularPoints:
             below = found.eigenvalue_count(0.0)
         except ConvergenceError:  # exactly singular: two shifts count it, or tell what is wrong
             return None
-        right = np.column_stack([found.border.array_r.real, self._generic])
+        right = np.column_stack([found.border.array_r, self._generic])
         with self.system.clock("solve"):
             solved = found.solutions(right)
         size = inertia.sizes(grown := solved[:, 1:])

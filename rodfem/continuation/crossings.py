@@ -37,7 +37,7 @@ AXIS, REAL = 0.4, 1e-6
 """Imaginary parts of a root, in pieces: below the first it may be a pair of crossings, below the second it is real."""
 DEEPEST, SHORTEST = 8, 1e-8
 """Divisions of a piece, at most; length of a piece, in the metric, that is not divided."""
-SAFE = 10.0
+SAFE = 20.0
 """Times the fourth derivative at one place that bounds it in a piece, and what the cubic is off against rates."""
 PLACES = np.linspace(0.02, 0.98, 49)
 """Where other eigenvalues are compared with zero, in pieces."""
@@ -153,11 +153,12 @@ def clear(a: Node, b: Node, off: np.ndarray) -> bool:
     n, turned = int((values < 0).sum()), vectors.T @ control @ vectors
     margin = np.zeros_like(turned)
     margin[2] = 16 / 6 * vectors.T @ off @ vectors
-    low, high = (turned + margin)[:, :n, :n], (turned - margin)[:, n:, n:]
-    return bool(
-        (n == 0 or np.linalg.eigvalsh(low)[:, -1].max() < 0)
-        and (n == len(values) or np.linalg.eigvalsh(high)[:, 0].min() > 0)
-    )
+    try:
+        for definite in (-(turned + margin)[:, :n, :n], (turned - margin)[:, n:, n:]):
+            np.linalg.cholesky(definite)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 @dataclass

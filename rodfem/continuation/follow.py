@@ -74,7 +74,7 @@ class StepControl:
     def after(self, step: float, moved: float, order: int) -> float:
         """Length of the next step; the correction ``moved`` the prediction, that of a predictor of an ``order``."""
         factor = (self.aim / max(moved, NEGLIGIBLE)) ** (1 / order)
-        return min(step * min(max(factor, 0.4), 3.0), self.largest)
+        return min(step * min(max(factor, 0.4), 1.6), self.largest)
 
     def accepts(self, before: Point, after: Point) -> bool:
         """Whether a step that has converged is kept; else half of it is tried."""

@@ -58,7 +58,7 @@ class PersistentZeros:
 
     def _say(self, solver: BranchSolver, before: Point, point: Point, extra: int) -> None:
         """Report eigenvalues that are zero at two rows: to round-off, or to what Newton's method leaves of a state."""
-        found = names_for(solver.system)(point.x, solver.inertia.modes_near_zero(point.x, extra))
+        found = names_for(solver.system)(before.x, solver.inertia.modes_near_zero(before.x, extra))
         stay = f"  {many(extra, 'eigenvalue stays', 'eigenvalues stay')} zero that no symmetry of the scene explains "
         stay += f"({', '.join(dict.fromkeys(found))})"
         if _exact(solver, (before, point), extra) == extra:
