@@ -204,19 +204,28 @@ class SingularSystem:
                 dx, share = step = self._step(at, x - start, t)
             except (ConvergenceError, np.linalg.LinAlgError):
                 return None
-            size = self.system.norm(dx)
-            if section:  # the metric of the state, and both parameters
-                size, t = float(np.sqrt(dx.dot(self.inertia.metric * dx) + (share[:2] ** 2).sum())), t + share[1]
+            size = self._size(dx, share)
+            t += share[1] if section else 0.0
             x.axpy(1.0, dx)
             moved += size
             return Correction(moved, size)
 
-        reach = section.reach if section else 0.5  # in the metric: farther away it is another one
-        outcome = newton(iteration, Limits(reach=reach, lost=lambda: self._lost(x, at, step)))
+        outcome = newton(iteration, Limits(reach=self._reach, lost=lambda: self._lost(x, at, step)))
         if not outcome.converged or at is None or step is None:
             return None
         step[0].scale(outcome.error if outcome.error < TOLERANCE else 1.0)  # what convergence leaves, or round-off
         return self._state(x, t, at, step)
+
+    @property
+    def _reach(self) -> float:
+        """Distance, in the metric, beyond which a state is another one."""
+        return 0.5 if self._section is None else self._section.reach
+
+    def _size(self, dx: PETSc.Vec, share: np.ndarray) -> float:
+        """Size of a step; on a curve in the metric of the state, and both parameters."""
+        if self._section is None:
+            return self.system.norm(dx)
+        return float(np.sqrt(dx.dot(self.inertia.metric * dx) + (share[:2] ** 2).sum()))
 
     def _lost(self, x: PETSc.Vec, at: Linear | None, step: Step | None) -> bool:
         """Whether round-off of the eigenvalue at ``x`` moves the load by as much as a step to a branch point."""

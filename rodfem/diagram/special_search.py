@@ -259,7 +259,8 @@ class SpecialSearch:
     ) -> tuple[list[SpecialPoint], list[tuple[Node, Node]]]:
         """The branch point at which the load turns back, if there is one, and the pieces on both sides of it."""
         turn = piece.turn(p, q)
-        found = None if turn is None else self._touch_point(piece, (p, q), turn, ended=ended)
+        folded = turn is not None and _turns_in_fold(piece, p, q, of_turn(piece, p, q, turn))
+        found = None if turn is None or folded else self._touch_point(piece, (p, q), turn, ended=ended)
         if found is None:
             return [], [(p, q)]
         (touch, *made), pieces = found, list[tuple[Node, Node]]()
@@ -289,8 +290,6 @@ class SpecialSearch:
         An eigenvalue touches zero there.
         """
         (p, q), solver = ends, piece.solver
-        if p.index != q.index and is_fold(solver, (at := of_turn(piece, p, q, s)).x, at.null):
-            return None
         margin = ASIDE * (q.s - p.s)
         left, right = (
             piece.solve(p, q, max(s - margin, (p.s + s) / 2)),
@@ -302,9 +301,7 @@ class SpecialSearch:
         if why := taut_where_it_turns(solver.shape, at.x):
             self.observer.warn(Remark(why, solver.system.scalar(at.x)))
             return None
-        if left.index != right.index and is_fold(solver, at.x, at.null):
-            return None
-        found = solved(solver, at, fold=False)
+        found = None if _turns_in_fold(piece, left, right, at) else solved(solver, at, fold=False)
         if found is None:
             return None
         if found.size > found.noise:
@@ -379,6 +376,11 @@ class SpecialSearch:
         gap = self._open_gap(piece, at, found, ended=resolved)
         if gap is not None and resolved:
             self._add(gap, solver)
+
+
+def _turns_in_fold(piece: Piece, p: Node, q: Node, at: Candidate) -> bool:
+    """Whether the load clearly turns back in a fold between two nodes."""
+    return p.index != q.index and is_fold(piece.solver, at.x, at.null)
 
 
 def arms(solver: BranchSolver, gap: Gap) -> list[Point]:

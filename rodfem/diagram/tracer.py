@@ -189,7 +189,7 @@ class Tracer:
         if row.stretch <= 0:
             self._end_at_zero_stretch(branch, previous, row)
         self._require_convexity(branch, previous, row)
-        self._add_special_points(branch, previous, row, closed=bool(last))
+        self._add_special_points(branch, previous, row, "closed" if last else "")
         history.append(row)
         self._append(branch, row)
         if last:
@@ -200,20 +200,18 @@ class Tracer:
         branch.append(row)
         self.observer.progress(branch, row)
 
-    def _add_special_points(
-        self, branch: Branch, a: Point, b: Point, *, closed: bool = False, end: bool = False
-    ) -> None:
-        """Insert special points between two points, the second maybe where the branch began, or without stretch.
+    def _add_special_points(self, branch: Branch, a: Point, b: Point, last: str = "") -> None:
+        """Insert special points between two points, the second maybe where it is ``closed``, or ``unstretched``.
 
-        At such an ``end`` eigenvalues vanish, which is no special point of its own.
+        In an unstretched state eigenvalues vanish, which is no special point of its own.
         """
         with self.solver.system.clock.scope("location"):
             specials = [] if a is branch.points[0] and branch.parent else self.specials.advance(b)
-            if end:
+            if last == "unstretched":
                 close = located(self.solver, b)
                 specials = [s for s in specials if abs(s.point.load - b.load) > close]
             self._leave(branch, specials, b)
-            step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=closed)
+            step = Step(self.solver, a, b, specials, begins=a is branch.points[0], closed=last == "closed")
             self._insert(branch, specials + self._requests(step))
 
     def _leave(self, branch: Branch, specials: list[SpecialPoint], b: Point) -> None:
@@ -285,7 +283,7 @@ class Tracer:
                 self._add_special_points(branch, a, near)
                 branch.append(near)
                 a = near
-        self._add_special_points(branch, a, last, end=True)
+        self._add_special_points(branch, a, last, "unstretched")
         end = end_at_zero_stretch(self.solver, last, error_bars=self.plan.error_bars)
         if not isnan(end.error_estimate):
             self.control.check(end)

@@ -113,7 +113,7 @@ class Equations:
         self.uniform = not (places or scene.sides[1].turn)
         others = {"energy": W * dx, "metric": self._metric(a, b) * dx, "kinetic": kinetic}
         if scene.conservative:
-            loads += [x * dx for x in fields.formulation.dead_forces(self, along)]
+            loads += fields.formulation.dead_forces(self, along, dx)
             others |= {"potential": potential} | ({"loads": sum(loads)} if loads else {})
         others |= self._ordinate(along, dx)
         derivatives = {"jacobian": ufl.derivative(first, u, trial), "residual": first}
