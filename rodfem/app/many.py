@@ -38,8 +38,7 @@ from rodfem.whole_files import locked
 Work = Callable[[Scene], dict[str, Any]]
 OF_POINT = dict(zip(NUMBERS, ("load", "error_estimate", "ordinate", "negative_before", "negative_after"), strict=True))
 """What a family has of a special point, and the entries of files."""
-MODELS = 8  # traced rods, with those continued from them, that others may be continued from
-TRIED = 2  # of these, the nearest ones, before a rod is traced
+MODELS, TRIED = 8, 2  # traced rods that others may be continued from; the nearest ones, before a rod is traced
 
 
 def key_of(scene: Scene) -> dict[str, Any]:

@@ -41,17 +41,19 @@ UNSTABLE = "another frequency has become unstable, or stable, since the row befo
 """Marks of a row where their number has changed, with a potential and without one."""
 IMPERFECT = 1e-7
 """Over the lowest bending eigenvalue, or over the terms that cancel: a larger imperfection is not one of the mesh."""
-PITCHFORK = 1e-6
-"""Derivative of an eigenvalue along its null vector, over the lowest bending one, of which a symmetry leaves less."""
-WIDE = 4e-3  # step of second differences, which lose more digits to round-off, in the metric
+PITCHFORK, WIDE = 1e-6, 4e-3
+"""Derivative of an eigenvalue along its null vector, over the lowest bending one, of which a symmetry leaves less; step
+of second differences, which lose more digits to round-off, in the metric."""
 FEWER = 1e-5
 """Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
 their mean, are not equal by a symmetry."""
-FIRST = 1e-4  # first step of the secants, relative to the bounds, below which they end where they no longer shrink
-DIFFERENCE = 1e-3
-"""Step of the central differences of ``D``, and of a count next to a divergence load, relative to the bounds."""
-CENTRAL = ((1.0, 0.5), (-1.0, -0.5))
-INWARD = ((0.0, -25 / 12), (1.0, 4.0), (2.0, -3.0), (3.0, 4 / 3), (4.0, -1 / 4))
+FIRST, DIFFERENCE = 1e-4, 1e-3
+"""First step of the secants, relative to the bounds, below which they end where they no longer shrink; step of the
+central differences of ``D``, and of a count next to a divergence load."""
+CENTRAL, INWARD = (
+    ((1.0, 0.5), (-1.0, -0.5)),
+    ((0.0, -25 / 12), (1.0, 4.0), (2.0, -3.0), (3.0, 4 / 3), (4.0, -1 / 4)),
+)
 """Places and weights of a central difference, and of one of the fourth order to one side."""
 Interval = tuple[float, float]
 Prediction = tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]

@@ -33,8 +33,7 @@ WEIGHTS = [[1.0], [2.0, -1.0], [3.0, -3.0, 1.0], [4.0, -6.0, 4.0, -1.0]]
 """Of rods in line with a new one and at equal distances, the nearest first, by their number."""
 NUMBERS = ("critical_load", "error", "ordinate", "index_before", "index_after")
 """What a family has of a special point."""
-NEAR = 0.05  # part of the range of loads within which a special point has the modes of others in its border
-KEPT = 400  # rods to continue from
+NEAR, KEPT = 0.05, 400  # part of the range of loads in which modes of others are in a border; rods to continue from
 Values = tuple[float, ...]
 
 

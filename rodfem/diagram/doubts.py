@@ -19,8 +19,8 @@ from rodfem.fem.newton import TOLERANCE
 from rodfem.stability.motion_names import names_for
 from rodfem.stability.near_zero import resolve
 
-SHARE = 8  # of the points of a composite rule, where few do
-ROWS = 4  # rows one after the other that have as many zero eigenvalues, before these are said to stay
+SHARE, ROWS = 8, 4
+"""Part of the points of a composite rule, where few do; rows in sequence with as many zeros, before these stay."""
 
 
 class PersistentZeros:

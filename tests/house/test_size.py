@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
     "lines of Python": 32307,
     "files of Python": 148,
-    "lines of C": 957,
+    "lines of C": 1026,
     "module constants with a number": 248,
     "functions of a complexity above 10": 0,
     "functions of six parameters or more": 18,
