@@ -41,8 +41,8 @@ class Equations:
     ``metric`` is ``(4/l) int dq.dq + (1/l^3) int dr.dr``, the squared size of a change of state (about the mean square
     rotation), ``kinetic`` that of the spectrum, ``int rho_A dr.dr + w . rho_I w`` with the spin ``w``; it may be
     ``massless``, or ``even``: without the arclength.  ``potential`` is the Lagrangian without the constraints at nodes,
-    at an equilibrium the total potential energy, None if a load has none; ``loads`` is that without the rod.  In
-    ``uniform`` equations there is no arclength, no turn between joined ends, and nothing acts at points inside the rod.
+    at an equilibrium the total potential energy, None if a load has none; ``loads`` are its parts that act on the rod.
+    ``uniform`` equations have no arclength, no turn between joined ends, and nothing that acts at inner points.
     ``register`` says what the forms read now, of whichever scene: the ``line`` taken last, and the ``values`` that were
     put there since then.
     """
@@ -56,7 +56,8 @@ class Equations:
         self._assemblers = [Assembler(form, self.cells, self.known, int(fields.copies[0, -1])) for form in compiled]
         self.jacobian, self.residual, self.energy, self.metric, self.kinetic = self._assemblers[:5]
         others = dict(zip(forms, self._assemblers, strict=True)).get
-        self.potential, self.loads, self.ordinate = others("potential"), others("loads"), others("ordinate")
+        self.potential, self.ordinate = others("potential"), others("ordinate")
+        self.loads = [form for form in (others("loads"), others("dead forces")) if form is not None]
         self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
 
     @classmethod
@@ -113,8 +114,8 @@ class Equations:
         self.uniform = not (places or scene.sides[1].turn)
         others = {"energy": W * dx, "metric": self._metric(a, b) * dx, "kinetic": kinetic}
         if scene.conservative:
-            loads += fields.formulation.dead_forces(self, along, dx)
             others |= {"potential": potential} | ({"loads": sum(loads)} if loads else {})
+            others |= fields.formulation.dead_forces(self, along, dx)
         others |= self._ordinate(along, dx)
         derivatives = {"jacobian": ufl.derivative(first, u, trial), "residual": first}
         return derivatives | {name: self.compilable(x) for name, x in others.items()}

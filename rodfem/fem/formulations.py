@@ -170,9 +170,9 @@ class Formulation:
         """Integrand of the Lagrangian of the rod with the stored energy ``W``: see :mod:`rodfem.forms.lagrangian`."""
         return lagrangian.pointwise(W, along.R, along.v, along.dr, equations.unknowns.n)
 
-    def dead_forces(self, equations: Equations, along: Place, dx: Any) -> list[Any]:
-        """Terms of the potential of dead forces at the ends, if no term of an end has it."""
-        return []
+    def dead_forces(self, equations: Equations, along: Place, dx: Any) -> dict[str, Any]:
+        """The potential of dead forces at the ends by its name, if no term of an end has it."""
+        return {}
 
     def contact_force(self, equations: Equations) -> list[Any]:
         """Components of the contact force in space (3,)."""
@@ -246,10 +246,11 @@ class Reduced(Formulation):
         chord = [0.0 if x is None or y is None else y - x for x, y in zip(left, right, strict=True)]
         return lagrangian.reduced(W, along.R, along.v, ufl.as_vector(force), ufl.as_vector(chord) / equations.length)
 
-    def dead_forces(self, equations: Equations, along: Place, dx: Any) -> list[Any]:
-        """Those of the components of the contact force which they prescribe: ``-n.r'``."""
+    def dead_forces(self, equations: Equations, along: Place, dx: Any) -> dict[str, Any]:
+        """That of the components of the contact force which they prescribe: ``-n.r'``."""
         known, slope = [equations.fields.scene.known_force(i, equations.constants) for i in range(3)], along.R * along.v
-        return [-n * slope[i] * dx for i, n in enumerate(known) if n is not None and n != 0]
+        terms = [-n * slope[i] * dx for i, n in enumerate(known) if n is not None and n != 0]
+        return {"dead forces": sum(terms)} if terms else {}
 
     def contact_force(self, equations: Equations) -> list[Any]:
         """Unknown scalars, and what dead forces prescribe."""

@@ -25,6 +25,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rodfem.errors import SceneError
+from rodfem.fem.assembly import Assembler
 from rodfem.fem.state import LOAD, NodalValues
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
 from rodfem.problem.contribution import Block, Motion
@@ -106,28 +107,29 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
 
     Multipliers are zero, as they are as large as the forces of the rod.
     """
-    if not found or equations.loads is None:
+    if not found or not equations.loads:
         return np.eye(len(found))
     states = [generic_state(equations, seed, no_multipliers=True) for seed in range(len(found) + 3)]
     changes = np.array([[symmetry.change(state) for symmetry in found] for state in states])
     lengths = abs(changes / equations.fields.sizes).max(axis=(0, 2))
     lengths = np.where(lengths > 0, lengths, 1.0)
-    along = [_derivatives(state, change / lengths[:, None]) for state, change in zip(states, changes, strict=True)]
-    size = max(largest for _, largest in along)
-    if size == 0.0:
-        return np.eye(len(found))
+    conditions = list[np.ndarray]()
+    for form in equations.loads:
+        along = [_derivatives(state, form, x / lengths[:, None]) for state, x in zip(states, changes, strict=True)]
+        conditions += [row / max(TINY, *(largest for _, largest in along)) for row, _ in along]
     round_off = 1e-8  # of the differences, relative to the potential
-    return np.asarray(_null_space(np.array([row for row, _ in along]) / size, round_off) / lengths[:, None])
+    return np.asarray(_null_space(np.array(conditions), round_off) / lengths[:, None])
 
 
-def _derivatives(state: NodalValues, changes: np.ndarray, step: float = 1e-3) -> tuple[np.ndarray, float]:
-    """Derivatives of the potential of what acts on the rod along ``changes`` (m, local size), and its largest value."""
-    equations, loads = state.equations, state.equations.loads
-    assert loads is not None
+def _derivatives(
+    state: NodalValues, form: Assembler, changes: np.ndarray, step: float = 1e-3
+) -> tuple[np.ndarray, float]:
+    """Derivatives of a potential of what acts on the rod along ``changes`` (m, local size), and its largest value."""
+    equations = state.equations
     values = np.array(
         [
             [
-                NodalValues(equations, state.local + side * step * change, state.line).integral(loads)
+                NodalValues(equations, state.local + side * step * change, state.line).integral(form)
                 for side in (-2, -1, 1, 2)
             ]
             for change in changes
@@ -257,7 +259,7 @@ def generic_state(equations: Equations, seed: int, decay: float = 0.6, *, no_mul
         moved = local.copy()
         moved[fields.dofs.get("r", [])] *= size
         state = NodalValues(equations, moved, equations.line)
-        loads = 0.0 if equations.loads is None else state.integral(equations.loads)
+        loads = sum(state.integral(form) for form in equations.loads)
         if fields.comm.allreduce(bool(np.isfinite(loads) and np.isfinite(state.covector()).all()), op=MPI.LAND):
             break
     return state

@@ -39,7 +39,7 @@ def test_a_stiffness_that_the_load_takes_away(energy: Energy) -> None:
     (branch,) = trace(rod(energy), MESH, Plan(depth=0, error_bars=False))
     assert branch.ended.startswith("the stored energy is not convex any more at P = ")
     assert not [s for s in branch.special if not s.kind.request]
-    assert 0.85 < branch.points[-1].load < 1.0
+    assert 0.8 < branch.points[-1].load < 1.0
     assert {p.negative for p in branch.points} == {0}
     with pytest.raises(SceneError, match=r"not convex somewhere along the state at P = 1\b"):
         Solver(rod(energy), MESH).equilibrium(1.0)
@@ -65,7 +65,7 @@ def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
     plan = Plan(depth=0, error_bars=False, steps=StepControl(largest=0.1))
     (branch,) = trace(rod(narrow(lambda c: 1.0 - c.P, width)), MESH, plan)
     assert branch.ended == f"the stored energy is not convex any more at P = {1 - width:.6g}"
-    assert branch.points[-1].load < 1 - width < 1 + width < branch.points[-1].load + 0.15
+    assert branch.points[-1].load < 1 - width < 1 + width < branch.points[-1].load + 0.2
 
 
 @pytest.mark.few(1)

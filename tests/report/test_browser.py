@@ -333,7 +333,7 @@ def test_each_number_has_its_error_or_says_that_it_has_none(opened: Callable[...
     numbered = r"middle = 0\.2679\d+ \(\de-\d+\); energy = 2\.111695\d+ \(\de-\d+\)"
     assert load == "P = 11 (given)" and re.search(numbered, numbers)
     assert values == "" and len(re.findall(r"\d\.\d+ \(\de-\d+\) swings", modes)) == 2 and "0 (exact)" in modes
-    load, numbers, values = read("branch 1", 3, "state-load", "numbers", "values")
+    load, numbers, values = read("branch 1", 4, "state-load", "numbers", "values")
     assert load.startswith("P = ~") and numbers.count("~") == numbers.count(" = ") == 2 == values.count("~")
     assert "~: error not estimated" in page.find_element(By.ID, "errors").text
 
@@ -341,9 +341,9 @@ def test_each_number_has_its_error_or_says_that_it_has_none(opened: Callable[...
 def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., Any]) -> None:
     """Of a pinned column under the load P: the force has the size P, and the moment vanishes at the ends."""
     page = opened("pinned")
-    page.execute_script("import('report/store').then((store) => store.select(1, 8))")
-    until(page, lambda: shown(page) == ("branch 1", 8))
-    load = page.execute_script("return import('report/data').then(({ data }) => data.branches[1].load[8])")
+    page.execute_script("import('report/store').then((store) => store.select(1, 6))")
+    until(page, lambda: shown(page) == ("branch 1", 6))
+    load = page.execute_script("return import('report/data').then(({ data }) => data.branches[1].load[6])")
     found = {}
     for tab in page.find_elements(By.CSS_SELECTOR, "#profile-tabs button"):
         tab.click()
@@ -451,8 +451,8 @@ def differing(one: np.ndarray, other: np.ndarray) -> int:
 def test_the_page_looks_as_it_did(opened: Callable[..., Any]) -> None:
     """``RODFEM_GOLDEN=write`` in the environment takes the page as it is now for the one to compare with."""
     page = opened("pinned")
-    page.execute_script("import('report/store').then((store) => store.select(1, 8))")
-    until(page, lambda: shown(page) == ("branch 1", 8) and page.find_elements(By.CSS_SELECTOR, "#states canvas"))
+    page.execute_script("import('report/store').then((store) => store.select(1, 6))")
+    until(page, lambda: shown(page) == ("branch 1", 6) and page.find_elements(By.CSS_SELECTOR, "#states canvas"))
     until(page, lambda: page.execute_script("return document.querySelectorAll('#profile .trace').length") == 3)
     page.execute_async_script("setTimeout(arguments[0], 400)")
     seen = small(page.get_screenshot_as_png())
