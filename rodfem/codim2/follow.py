@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem import compat
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Enriched, bound
 from rodfem.codim2.criteria import (
     DIFFERENCE,
@@ -75,6 +76,7 @@ class Half:
         """Follow to an end."""
         step, failures = control.first, 0
         while not self.ended and len(self.steps) < control.most:
+            compat.destroy_garbage(self.criterion.solver.system.comm)
             # beyond a sharp bend the polynomial through the last nodes has another tangent than the curve
             recent = self.steps[-ROWS:] if failures < 2 else self.steps[-1:]
             try:
@@ -323,6 +325,7 @@ class Curve:
         rows = sorted({*np.linspace(0, len(error) - 1, number).round().astype(int).tolist(), *self.marks})
         richer = RicherMesh(self.criterion, self.special.kind, self.nodes[rows[0]])
         for row in rows:
+            compat.destroy_garbage(self.criterion.solver.system.comm)
             try:
                 error[row], resolved = richer.compare(self.nodes[row])
                 unresolved |= set() if resolved else {row}

@@ -31,6 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem import compat
 from rodfem.adaptivity.mesh_sequence import interpolated
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point
@@ -95,6 +96,7 @@ class Deflation:
         before = len(self.tries)
         over = turned_over(self.system, self.bases[0]) if self.bases else []
         for number in range(before, before + tries):
+            compat.destroy_garbage(self.system.comm)
             x = self.start.copy()
             if number < len(over):
                 x = over[number]
