@@ -13,9 +13,9 @@ from math import ceil, floor, inf, isfinite, log10, nan
 from typing import Any
 
 from rodfem.continuation.branch import ORDINATE, PITCHFORK, VERTICAL_BRANCH
-from rodfem.continuation.kinds import FLUTTER, KINDS
+from rodfem.continuation.kinds import END, FLUTTER, KINDS
 from rodfem.errors import many
-from rodfem.output.pieces import is_solved
+from rodfem.output.pieces import COMPLETE, is_solved
 from rodfem.output.table import reactions_by_name, soft_modes
 from rodfem.stability import soft_mode
 from rodfem.stability.soft_mode import ONE_SIDE, index_range, on_kink, stability
@@ -135,11 +135,11 @@ def table_of(data: Data) -> Iterator[tuple[str, str, str, str, str, list[str]]]:
     scale, known = _scale(data), _is_estimated(data)
     for branch, special in ((b, special) for b in data["branches"] for special in b["special"]):
         row = row_of(branch, special["row"])
-        found = {name: _read(special, name, inf, scale * (name == "ordinate")) for name in READ}
-        found |= _request(branch, special)
+        found = {x: _read(special, x, inf, scale * (x == "ordinate")) for x in READ} | _request(branch, special)
         load, ordinate = (x if known else x.removesuffix(NO_ESTIMATE) for x in found.values())
         index = index_in_words(special, row) + (f", {special['zero']} zero" if special["zero"] else "")
-        yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, _remarks(special, row)
+        reason = [branch["ended"]] * (special["kind"] == END and special["row"] > 0 and branch["ended"] not in COMPLETE)
+        yield branch["name"], KINDS[special["kind"]].words, load, ordinate, index, reason + _remarks(special, row)
 
 
 def _scale(data: Data) -> float:

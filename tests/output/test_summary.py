@@ -9,7 +9,9 @@ import classics
 import golden_cases
 import pytest
 
+from rodfem import Diagram
 from rodfem.output.summary import in_sentences
+from rodfem.output.words import special_lines
 
 
 def branch(name: str, loads: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
@@ -29,9 +31,14 @@ def said(*branches: dict[str, Any], span: tuple[float, float] = (0.0, 4.0), **mo
 
 
 @cache
+def traced(name: str) -> Diagram:
+    """Diagram of a recorded scene, traced on its usual mesh."""
+    return golden_cases.trace(golden_cases.cases()[name](), error_bars=False)
+
+
 def known(name: str) -> str:
-    """Sentences on a recorded scene, traced on its usual mesh."""
-    return golden_cases.trace(golden_cases.cases()[name](), error_bars=False).in_words()
+    """Sentences on a recorded scene."""
+    return traced(name).in_words()
 
 
 # --- what is known ----------------------------------------------------------------------------------------------------
@@ -77,6 +84,8 @@ def test_how_a_branch_ends() -> None:
     assert words.endswith("from P = 0 to 4; it ends where it meets another branch at P = 4.")
     words = said(branch("straight", [0.0, 4.0], [0, 0], ended="stretch reaches zero"))
     assert words.endswith("; it ends there: stretch reaches zero.")
+    *_, last = special_lines(traced("demo hemitropic").data)
+    assert last == "    stretch reaches zero"
 
 
 # --- by hand ----------------------------------------------------------------------------------------------------------
