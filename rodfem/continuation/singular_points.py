@@ -21,7 +21,7 @@ from rodfem.continuation.singular import SingularState, SingularSystem, load_unc
 from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import combine, complement, orthonormalize
 from rodfem.stability.inertia import Index
-from rodfem.stability.reduced_stiffness import SOFT
+from rodfem.stability.reduced_stiffness import NEARLY_ZERO
 from rodfem.tolerances import round_off
 
 COUPLED = 1e-5
@@ -101,7 +101,7 @@ def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
         tangent = slope * (1.0 / solver.system.norm(slope))
         reduced = piece.condensation.at(x, tangent, piece.condensation.border(x))
         far, W, (values, own) = reduced.far, reduced.W, np.linalg.eigh(reduced.H)
-    zero = abs(values) < SOFT * solver.inertia.scale
+    zero = abs(values) < NEARLY_ZERO * solver.inertia.scale
     zero[abs(values).argmin()] = True
     negative, modes = far + int((values[~zero] < 0).sum()), _modes(piece, W, own[:, zero])
     return Candidate(x, slope, modes, len(modes), p.index, p.index, negative, q.s - p.s, crossing=False)

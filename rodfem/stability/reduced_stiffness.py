@@ -36,7 +36,7 @@ from rodfem.linalg.matrices import local_rows, shared_matrix, times
 from rodfem.stability.inertia import DOUBTFUL, Inertia
 from rodfem.stability.near_zero import quotient_error
 
-SOFT = 1e-6
+NEARLY_ZERO = 1e-6
 """Eigenvalue of H, over the lowest bending one, below which it may be round-off."""
 DIFFERENCE, AHEAD = 1e-4, 1e-6
 """Distances of the states whose matrices are differenced, in the metric: on both sides, and ahead alone."""
@@ -185,7 +185,7 @@ class Condensation:
         else:
             far, W = below - int((values < 0).sum()), Z @ H
         soft, doubt = int(abs(values).argmin()), TOLERANCE * inertia.scale
-        if small := bool(abs(values[soft]) < SOFT * inertia.scale):
+        if small := bool(abs(values[soft]) < NEARLY_ZERO * inertia.scale):
             doubt = max(doubt, quotient_error(inertia.at(x).matrix, self.system.new_vector(W @ vectors[:, soft])))
         rotated = float(abs(np.linalg.eigvalsh(inertia.sum(W.T @ inertia.weighed(W))) - 1.0).max())
         zero = int((abs(values) <= doubt).sum())
