@@ -315,6 +315,7 @@ TABLE = {
         "unknowns-of-other-constants-stay": (
             "(out.formulation, out.unknown_scalars) == (self.formulation, self.unknown_scalars)", "True",
             OTHER_CONSTANTS),
+        "mumps-in-any-units": ("Mumps(kind, sizes)", "Mumps(kind)", "problem/test_units.py"),
         "more-modes-than-there-are": (
             "if number > (most := most_eigenvalues(scene, discretization)):",
             "if number > 10**9 * (most := most_eigenvalues(scene, discretization)):", "stability/test_assessment.py"),
@@ -361,9 +362,6 @@ TABLE = {
             "memcpy(s, c->natural, c->n * sizeof(double));", "for (int i = 0; i < c->n; i++) s[i] = 1.0;",
             "problem/test_units.py"),
         "pivots-of-two-rows": ("det < 0 ? 1 : 2 * (e < 0)", "det < 0 ? 1 : 0", "linalg/test_chain.py"),
-    },
-    "rodfem/linalg/chain.py": {
-        "mumps-in-any-units": ("Mumps(kind, sizes)", "Mumps(kind)", "problem/test_units.py"),
     },
     "rodfem/modes/finder.py": {
         "bars-of-modes-by-the-nearest": (

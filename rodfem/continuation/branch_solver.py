@@ -138,7 +138,6 @@ def across_orbit(system: System, last: PETSc.Vec, x: PETSc.Vec, direction: PETSc
     phase, generators = system.phase, system.at(last).generators
     for i, weights in phase.broken.items():
         motion, condition = system.new_vector(weights @ generators), phase.conditions[i]
-        assert condition is not None
         x.axpy(phase.offsets[i] - condition.dot(x), motion)
         direction.axpy(-condition.dot(direction), motion)
 

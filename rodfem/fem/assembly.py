@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.linalg.compiled import Memory, addresses, buffer, module
-from rodfem.linalg.matrices import shared_matrix
+from rodfem.linalg.matrices import bordered, matrix_of
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields
@@ -36,11 +36,6 @@ class Places:
         given = {"row": rows, "kind": kinds, "column": columns}
         arrays = {name: np.ascontiguousarray(x, dtype=np.int32) for name, x in given.items() if x is not None}
         self._memory.point(self.pointer, **arrays)
-
-
-def vector_places(dofs: np.ndarray, targets: np.ndarray) -> Places:
-    """Places of a vector: ``targets`` (local size,) of the degrees of freedom ``dofs`` (cells, n) of each cell."""
-    return Places(targets[dofs])
 
 
 def matrix_places(dofs: np.ndarray, rows: np.ndarray, columns: np.ndarray, pattern: sp.csr_matrix) -> Places:
@@ -142,21 +137,8 @@ class Assembler:
 
 def bordered_pattern(fields: Fields) -> sp.csr_matrix:
     """Nonzero pattern, with the diagonal, of this rank's rows: couplings inside cells; rows and columns of scalars."""
-    comm, n, own = fields.comm, fields.unknowns, len(fields.free_owned)
-    rows = _own_rows(fields, list(fields.dofs))
-    scalars = np.array(list(fields.scalars.values()), dtype=np.int32)  # beyond all fields: the last columns of each row
-    size = len(scalars)
-    indptr = rows.indptr.astype(np.int64) + size * np.arange(own + 1)
-    indices = np.empty(indptr[-1], dtype=np.int32)
-    scalar = (indptr[1:, None] - size + np.arange(size)).ravel()
-    field = np.ones(len(indices), dtype=bool)
-    field[scalar] = False
-    indices[scalar], indices[field] = np.tile(scalars, own), rows.indices
-    if comm.rank == comm.size - 1:
-        indptr = np.append(indptr, indptr[-1] + n * np.arange(1, size + 1))
-        indices = np.append(indices, np.tile(np.arange(n, dtype=np.int32), size))
-    shape = (fields.local_unknowns, n)
-    return sp.csr_matrix((np.ones(len(indices), dtype=np.int8), indices, indptr), shape=shape)
+    rows, scalars = _own_rows(fields, list(fields.dofs)), len(fields.scalars)  # the last columns of each row
+    return bordered(rows, fields.unknowns, scalars, fields.local_unknowns - rows.shape[0])[0]
 
 
 def metric_pattern(fields: Fields) -> sp.csr_matrix:
@@ -194,13 +176,7 @@ def _own_rows(fields: Fields, names: list[str]) -> sp.csr_matrix:
 
 def new_matrix(fields: Fields, pattern: sp.csr_matrix, rows: PETSc.LGMap, columns: PETSc.LGMap) -> PETSc.Mat:
     """Zero PETSc AIJ matrix with a pattern; its values are shared with numpy where compiled code assembles it."""
-    if fields.compiled:
-        matrix = shared_matrix(fields.comm, pattern)
-    else:
-        size = (fields.local_unknowns, fields.unknowns)
-        matrix = PETSc.Mat().createAIJ((size, size), comm=fields.comm)
-        index = (pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType))
-        matrix.setPreallocationCSR((*index, np.zeros(pattern.nnz)))
+    matrix = matrix_of(fields.comm, pattern, compiled=fields.compiled)
     matrix.setLGMap(rows, columns)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_LOCATION_ERR, True)
     matrix.setOption(PETSc.Mat.Option.IGNORE_ZERO_ENTRIES, True)  # a point between two cells couples all of both, by 0

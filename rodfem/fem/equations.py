@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from rodfem.expressions import apply_algebra_lowering, extract_type
 from rodfem.fem import form_compiler
-from rodfem.fem.assembly import Assembler, Cells, vector_places
+from rodfem.fem.assembly import Assembler, Cells, Places
 from rodfem.fem.fields import FEW, Discretization, Fields
 from rodfem.fem.known import TableFunctions, readable
 from rodfem.fem.state import Line, load_line
@@ -58,7 +58,7 @@ class Equations:
         others = dict(zip(forms, self._assemblers, strict=True)).get
         self.potential, self.ordinate = others("potential"), others("ordinate")
         self.loads = [form for form in (others("loads"), others("dead forces")) if form is not None]
-        self.local_places = vector_places(self.cells.dofs, np.arange(len(fields.number)))
+        self.local_places = Places(self.cells.dofs)
 
     @classmethod
     def of(cls, scene: Scene, discretization: Discretization, comm: MPI.Comm) -> Equations:

@@ -23,6 +23,8 @@ from rodfem.errors import InputError
 from rodfem.fem import formulations
 from rodfem.fem.formulations import CONTACT_FORCE, Formulation, turning_of
 from rodfem.fem.state import LOAD
+from rodfem.linalg.chain import Chain, Factors
+from rodfem.linalg.factorization import Mumps, Sizes
 from rodfem.problem.arguments import convert, optional, reals, whole
 from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.functions import Constants
@@ -316,13 +318,12 @@ class Fields:
 
     @property
     def compiled(self) -> bool:
-        """Whether compiled code assembles matrices: on one rank, unless PETSc is asked for."""
+        """Whether compiled code assembles and factors matrices: on one rank, unless PETSc is asked for."""
         return self.comm.size == 1 and self.discretization.factors == CHAIN
 
-    @property
-    def chain_size(self) -> int:
-        """Number of unknowns of the matrices that are factored along the rod; 0 where PETSc is to factor them."""
-        return self.unknowns if self.discretization.factors == CHAIN else 0
+    def factors(self, kind: str, sizes: Sizes | None = None, borders: int = 0) -> Factors:
+        """Factors ``lu``, or ``cholesky``, of matrices of a system, which may have dense ``borders`` as well."""
+        return Chain(kind, self.dense_rows + borders, sizes) if self.compiled else Mumps(kind, sizes)
 
     @property
     def dense_rows(self) -> int:

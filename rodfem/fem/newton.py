@@ -16,13 +16,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.fem.assembly import ONE_CELL
-from rodfem.linalg.chain import Chain
+from rodfem.linalg.chain import Chain, Factors
 from rodfem.linalg.compiled import Memory, buffer, module
 from rodfem.linalg.matrices import EPS, shared
 
 if TYPE_CHECKING:
     from rodfem.fem.system import System
-    from rodfem.linalg.factorization import Factors
 
 TOLERANCE = 1e-10
 """Size of the last correction of a converged state: rotations in radian, load over its span, all else relative, in
@@ -369,7 +368,5 @@ class CompiledNewton:
 
 
 def compiled_newton(system: System, matrix: PETSc.Mat, factors: Factors) -> CompiledNewton | None:
-    """Compiled iteration where a ``matrix`` of the ``system`` and its ``factors`` are those of compiled code."""
-    if shared(matrix) is None or not isinstance(factors, Chain):
-        return None
-    return CompiledNewton(system, matrix, factors)
+    """Compiled iteration for a ``matrix`` of the ``system``, where compiled code makes its ``factors``."""
+    return CompiledNewton(system, matrix, factors) if isinstance(factors, Chain) else None

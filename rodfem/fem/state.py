@@ -186,19 +186,14 @@ class State(NodalValues):
                 out.setValues(system.equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
                 out.assemble()
             for i, value in enumerate(self.drifts.tolist()):
-                phase, push = system.phase.conditions[i], system.phase.pushes[i]
-                if phase is not None and push is not None:
-                    out.axpy(value, push)
-                    value = self.product(phase) - system.phase.offsets[i]
+                if i in system.phase.conditions:
+                    out.axpy(value, system.phase.pushes[i])
+                    own = self.fields.free_owned  # a condition has no component along scalars
+                    value = float(system.sum(system.phase.rows[i][: len(own)] @ self.local[own]))
+                    value -= float(system.phase.offsets[i])
                 if system.has_scalars:
                     out.setValue(system.drifts[i], value)
                 out.assemble()
-
-    def product(self, phase: PETSc.Vec) -> float:
-        """Product with a covector that has no component along scalars."""
-        own, comm = self.fields.free_owned, self.fields.comm
-        mine = float(phase.array_r[: len(own)].real @ self.local[own])
-        return mine if comm.size == 1 else float(comm.allreduce(mine, op=MPI.SUM))  # asked for in every residual
 
     def jacobian(self, row: PETSc.Vec) -> PETSc.Mat:
         """Jacobian into the system's matrix, with ``row`` as the row of the load."""

@@ -278,17 +278,14 @@ class Phase:
     vector: Callable[[np.ndarray], PETSc.Vec]
 
     @cached_property
-    def conditions(self) -> tuple[PETSc.Vec | None, ...]:
-        """``M g`` for each drift scalar as vectors, None where none is active."""
-        return self._vectors(self.rows)
+    def conditions(self) -> dict[int, PETSc.Vec]:
+        """``M g`` of each active condition as a vector."""
+        return {i: self.vector(row) for i, row in self.rows.items()}
 
     @cached_property
-    def pushes(self) -> tuple[PETSc.Vec | None, ...]:
-        """Forces of the drift scalars as vectors, None where no condition is active."""
-        return self.conditions if self.forces is self.rows else self._vectors(self.forces)
-
-    def _vectors(self, rows: dict[int, np.ndarray]) -> tuple[PETSc.Vec | None, ...]:
-        return tuple(self.vector(rows[i]) if i in rows else None for i in range(len(self.offsets)))
+    def pushes(self) -> dict[int, PETSc.Vec]:
+        """Forces of their drift scalars as vectors."""
+        return self.conditions if self.forces is self.rows else {i: self.vector(x) for i, x in self.forces.items()}
 
     @property
     def count(self) -> int:

@@ -23,7 +23,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_pattern, new_matrix, vector_places
+from rodfem.fem.assembly import Places, bordered_pattern, matrix_places, metric_pattern, new_matrix
 from rodfem.fem.equations import Equations
 from rodfem.fem.fields import FEW, Discretization
 from rodfem.fem.invariance import find_motion_along, find_symmetries
@@ -38,7 +38,6 @@ from rodfem.fem.symmetries import (
     phase_at,
     rigid_motions,
 )
-from rodfem.linalg.chain import factors_of
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
 from rodfem.problem.functions import derived, floats
@@ -84,7 +83,7 @@ class System:
         self.equation_targets = np.flatnonzero(without_load >= 0).astype(PETSc.IntType)
         self.equation_numbers = number[self.equation_targets].astype(PETSc.IntType)
         dofs = self.equations.cells.dofs
-        self.equation_places = vector_places(dofs, number) if self.fields.compiled else None
+        self.equation_places = Places(number[dofs]) if self.fields.compiled else None
         self._pattern, self._metric_pattern = derived(  # where scenes have as many symmetries, they have the same ones
             self.equations, len(self.drifts), lambda: (bordered_pattern(self.fields), metric_pattern(self.fields))
         )
@@ -102,7 +101,7 @@ class System:
         self.rigid = self._rigid()
         self.phase = no_phase(self)
         # no scaling (ICNTL(8) = 0): a third of the time; Newton's method mends what it costs
-        self.lu = factors_of("lu", comm, self.fields.chain_size, self.fields.dense_rows, self.natural_sizes)
+        self.lu = self.fields.factors("lu", self.natural_sizes)
         self.compiled = compiled_newton(self, self.matrix, self.lu)
 
     def _rigid(self) -> Generators | None:
@@ -236,14 +235,14 @@ class System:
 
     def add_drifts(self, matrix: PETSc.Mat) -> None:
         """Add rows and columns of the drift scalars: conditions and forces, or a one where a drift is switched off."""
-        for phase, push, index in zip(self.phase.conditions, self.phase.pushes, self.drifts, strict=True):
-            if phase is None or push is None:
-                if self.has_scalars:
-                    matrix.setValue(index, index, 1.0, addv=True)
-                continue
-            own = np.arange(*phase.getOwnershipRange(), dtype=PETSc.IntType)
-            matrix.setValues([index], own, phase.array_r, addv=True)
-            matrix.setValues(own, [index], push.array_r, addv=True)
+        for i, index in enumerate(self.drifts):
+            if i in self.phase.conditions:
+                condition, push = self.phase.conditions[i], self.phase.pushes[i]
+                own = np.arange(*condition.getOwnershipRange(), dtype=PETSc.IntType)
+                matrix.setValues([index], own, condition.array_r, addv=True)
+                matrix.setValues(own, [index], push.array_r, addv=True)
+            elif self.has_scalars:
+                matrix.setValue(index, index, 1.0, addv=True)
 
     @cached_property
     def stiffness_scale(self) -> float:

@@ -1,4 +1,4 @@
-"""Factors of matrices with a fixed pattern: what all of them have in common, and those of MUMPS.
+"""Factors of matrices with a fixed pattern by MUMPS.
 
 MUMPS serves rods on several ranks, and is the reference on one: what is factored along the rod
 (:mod:`rodfem.linalg.chain`) may be factored by it as well (``Discretization(factors="petsc")``), with the same numbers.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from petsc4py import PETSc
@@ -52,29 +52,10 @@ def preferred(prefix: str, values: dict[str, Any]) -> Iterator[None]:
             options.delValue(name)
 
 
-class Factors(Protocol):
-    """Factors ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia), of matrices given one after the other.
+class Mumps:
+    """Factors ``lu``, or ``cholesky`` (LDL^t, which also counts the inertia), by MUMPS, on all ranks of a matrix.
 
     ``regular`` is false where the last one was exactly singular, so that it has no solutions.
-    """
-
-    regular: bool
-
-    def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where MUMPS gives up on one."""
-
-    def solve(self, right: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Solve with the last factors."""
-
-    def solve_all(self, right: np.ndarray) -> np.ndarray:
-        """Solutions for all columns of ``right`` (own rows, k) at once: a column costs much less than a call."""
-
-    def inertia(self) -> tuple[int, int]:
-        """Number of negative eigenvalues of the symmetric matrix last factored, and of pivots that are zero."""
-
-
-class Mumps:
-    """Factors ``lu``, or ``cholesky`` (LDL^t), by MUMPS, on all ranks of a matrix.
 
     Unknowns are ordered by an approximate minimum degree that knows dense rows (QAMD): what MUMPS chooses by itself
     takes ten times as long to order the matrix of 3e4 elements with an integral constraint.  PETSc's options change
@@ -96,7 +77,7 @@ class Mumps:
         self._matrix = 0
 
     def __call__(self, matrix: PETSc.Mat) -> None:
-        """Factor ``matrix``; raises :class:`ConvergenceError` where MUMPS gives up.
+        """Factor ``matrix``; raises :class:`ConvergenceError` on all ranks where MUMPS gives up on one.
 
         Delayed pivots may need more room than was estimated.  PETSc does not raise by itself, and what a failed
         factorisation counts or solves is arbitrary: the factors are then made again with more room.

@@ -75,6 +75,32 @@ class Shared:
         return sp.csr_matrix((self.values, pattern.indices, pattern.indptr), shape=pattern.shape, copy=False)
 
 
+def bordered(rows: sp.csr_matrix, width: int, border: int, below: int) -> tuple[sp.csr_matrix, np.ndarray]:
+    """Pattern of sparse ``rows`` with the last ``border`` of ``width`` columns in each, and dense rows ``below`` them.
+
+    Returned with it is which entries of the given rows are those of the border.
+    """
+    count = rows.shape[0]
+    indptr = np.append(0, np.cumsum(np.append(np.diff(rows.indptr) + border, np.full(below, width))))
+    indices, added = np.empty(indptr[-1], dtype=np.int32), np.zeros(indptr[count], dtype=bool)
+    added[(indptr[1 : count + 1, None] - border + np.arange(border)).ravel()] = True
+    inside = indices[: len(added)]
+    inside[added], inside[~added] = np.tile(np.arange(width - border, width), count), rows.indices
+    indices[len(added) :] = np.tile(np.arange(width), below)
+    ones = np.ones(len(indices), dtype=np.int8)
+    return sp.csr_matrix((ones, indices, indptr), shape=(count + below, width)), added
+
+
+def matrix_of(comm: MPI.Comm, pattern: sp.csr_matrix, *, compiled: bool) -> PETSc.Mat:
+    """Zero matrix with a ``pattern`` of rows on this rank; that of ``compiled`` code shares its values with numpy."""
+    if compiled:
+        return shared_matrix(comm, pattern)
+    matrix = PETSc.Mat().createAIJ((pattern.shape, pattern.shape), comm=comm)
+    index = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
+    matrix.setPreallocationCSR((*index, np.zeros(pattern.nnz)))
+    return matrix
+
+
 def shared_matrix(comm: MPI.Comm, pattern: sp.csr_matrix) -> PETSc.Mat:
     """Zero matrix on the one rank of ``comm`` with a ``pattern``, whose indices are sorted; see :func:`shared`."""
     values = np.zeros(pattern.nnz)

@@ -26,8 +26,7 @@ from rodfem.fem.newton import compiled_newton
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
-from rodfem.linalg.chain import factors_of
-from rodfem.linalg.factorization import Factors
+from rodfem.linalg.chain import Factors
 from rodfem.linalg.matrices import EPS, local_rows, places_in, rounding, shared, times
 from rodfem.linalg.orthogonal import generic
 from rodfem.tolerances import TINY
@@ -84,7 +83,7 @@ class Inertia:
         self.metric.assemble()
         self._weights, self._shared = local_rows(self.metric).real, shared(self.matrix)
         self._on_metric = None if self._shared is None else places_in(self._shared.pattern, self._weights)
-        self.factors = factors_of("cholesky", system.comm, fields.chain_size, fields.dense_rows, system.natural_sizes)
+        self.factors = fields.factors("cholesky", system.natural_sizes)
         self.constraints, self.scale = fields.constraints(), system.stiffness_scale
         self.tolerance, self.resolution = ZERO_BAND * self.scale, 0.0
         self.vectors: list[PETSc.Vec] = []

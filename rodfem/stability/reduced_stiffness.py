@@ -25,14 +25,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
-from rodfem.linalg.chain import factors_of
-from rodfem.linalg.matrices import local_rows, shared_matrix, times
+from rodfem.linalg.matrices import bordered, local_rows, matrix_of, times
 from rodfem.stability.inertia import DOUBTFUL, Inertia
 from rodfem.stability.near_zero import quotient_error
 
@@ -54,27 +52,11 @@ class Bordered:
         self.system, self.k, self.constraints = system, borders, constraints
         self.comm, self.n, fields = system.comm, system.fields.unknowns, system.fields
         self.extra = borders if system.has_scalars else 0  # rows of the borders on this rank, the last one
-        inner, along = local_rows(matrix), self.n + borders
-        rows, last = inner.shape[0], np.arange(self.n, along)
-        counts = np.append(np.diff(inner.indptr) + borders, np.full(self.extra, along))
-        indices = np.empty(counts.sum(), dtype=PETSc.IntType)
-        indptr = np.append(0, np.cumsum(counts)).astype(PETSc.IntType)
-        ends = (indptr[1 : rows + 1, None] - borders + np.arange(borders)).ravel()
-        field = np.ones(indptr[rows], dtype=bool)
-        field[ends] = False
-        indices[: indptr[rows]][field], indices[ends] = inner.indices, np.tile(last, rows)
-        indices[indptr[rows] :] = np.tile(np.arange(along), self.extra)
-        pattern = sp.csr_matrix((np.ones(len(indices)), indices, indptr), (rows + self.extra, along))
-        self.own, self._border, self._rows = int(indptr[rows]), ~field, pattern
-        if fields.compiled:
-            self.matrix = shared_matrix(self.comm, pattern)
-            self._rows = local_rows(self.matrix)
-        else:
-            self.matrix = PETSc.Mat().createAIJ(((pattern.shape[0], along),) * 2, comm=self.comm)
-            self.matrix.setPreallocationCSR((pattern.indptr, pattern.indices, pattern.data))
+        pattern, self._border = bordered(local_rows(matrix), self.n + borders, borders, self.extra)
+        self.own, self.matrix = len(self._border), matrix_of(self.comm, pattern, compiled=fields.compiled)
+        self._rows = local_rows(self.matrix) if fields.compiled else pattern.astype(float)
         kind, natural = "lu" if constraints is None else "cholesky", system.natural_sizes and self._sizes
-        chain = along if fields.chain_size else 0
-        self.factors = factors_of(kind, self.comm, chain, fields.dense_rows + borders, natural)
+        self.factors = fields.factors(kind, natural, borders)
 
     def _sizes(self) -> PETSc.Vec:
         """Natural sizes of the unknowns; the multipliers of the borders have those of drifts."""

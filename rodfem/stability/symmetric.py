@@ -22,8 +22,7 @@ from slepc4py import SLEPc
 
 from rodfem.compat import slepc_errors
 from rodfem.errors import ConvergenceError
-from rodfem.linalg.chain import factors_of
-from rodfem.linalg.factorization import Factors
+from rodfem.linalg.chain import Factors
 from rodfem.linalg.matrices import places_in, shared
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.pencil import (
@@ -66,8 +65,7 @@ class SymmetricSolver(PencilMatrices):
 
     def __init__(self, inertia: Inertia) -> None:
         super().__init__(inertia.system)
-        self.inertia, fields = inertia, self.system.fields
-        self.factors = factors_of("cholesky", self.system.comm, fields.chain_size, fields.dense_rows)
+        self.inertia, self.factors = inertia, self.system.fields.factors("cholesky")
         self.scaled, self._shifted, self._factored = (self.matrix, self.mass), self.system.state_matrix(), np.nan
         self.scale = scale_in_units(self.system)
         self.shift, self.factorisations, self.last = -self.scale, 0, np.zeros(0)
