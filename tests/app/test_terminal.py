@@ -142,6 +142,17 @@ def test_help_has_all_that_pages_name() -> None:
     assert done.returncode == 0, done.stderr
 
 
+def test_the_spring_of_the_readme(capfd: pytest.CaptureFixture[str]) -> None:
+    """It prints the stiffness that the page says, the same whatever the steps; by Kirchhoff's equations 2424.4 N/m."""
+    block = re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL)[-1]
+    exec(block, {})
+    said, printed = (
+        int(re.findall(rf"(\d+){after}", text)[-1])
+        for text, after in ((block, "; the handbook's"), (capfd.readouterr().out, " N/m"))
+    )
+    assert said == printed == pytest.approx(2424.4, rel=0.005)
+
+
 @pytest.mark.long
 def test_python_of_the_readme(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     """All its blocks, one after the other, as they stand."""
