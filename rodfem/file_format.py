@@ -9,11 +9,13 @@ each entry, group and column.
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from stat import S_ISREG
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,9 +63,13 @@ class Format:
         """Open an HDF5 file; raises :class:`InputError` for what cannot be read inside of the block, too."""
         import h5py
 
-        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."), h5py.File(path, "r") as file:
-            self.check_hdf5(file, needs)
-            yield file
+        with refusal(unfit or f"{path} is no {self.name} ({{}}): give {self.file}."):
+            check_regular(path)
+            with h5py.File(path, "r") as file:
+                self.check_hdf5(file, needs)
+                if hollow := file.visititems(_hollow):
+                    raise OSError(f"of the array {hollow} a part only is stored")
+                yield file
 
     def _check(self, mark: Mapping[str, Any], entries: Any, where: Path | str, needs: Sequence[str]) -> None:
         if mark.get("name") != self.name:
@@ -105,12 +111,24 @@ def refusal(unfit: str) -> Iterator[None]:
         raise InputError(unfit.replace("{}", reason)) from trouble
 
 
+def check_regular(path: Path | str) -> None:
+    """Raise :class:`OSError` for a pipe or a device, on which a reader would wait for ever."""
+    if not S_ISREG(os.stat(path).st_mode):
+        raise OSError("it is no regular file")
+
+
+def _hollow(name: str, item: Any) -> str | None:
+    """Name of an array that is larger than what its file stores of it, which a reader would fill in memory."""
+    return name if getattr(item, "nbytes", 0) and item.nbytes > item.id.get_storage_size() else None
+
+
 def read_json(path: Path, form: Format, needs: Sequence[str] = ()) -> dict[str, Any]:
     """Contents of a JSON file, whose texts have no characters that a terminal obeys but ends of lines and tabs.
 
     Raises :class:`InputError` if it cannot be read, and as :meth:`Format.check` does.
     """
     try:
+        check_regular(path)
         text = CONTROL.sub(lambda found: found[0] if found[0] == r"\\" else "\ufffd", path.read_text(encoding="utf-8"))
         data: dict[str, Any] = json.loads(text)
     except FileNotFoundError as trouble:

@@ -219,9 +219,7 @@ class Terminal(Report):
                     self.say(f"\nThe {which} is on a locus above")
                     continue
                 if self.plan.accuracy is not None:
-                    self.say(
-                        "\nA locus stays on the mesh of its special point: its own estimate says how accurate it is"
-                    )
+                    self.say("\nA locus stays on the mesh of its special point: its estimate says how accurate it is")
                 known = len(near)
                 with self._guard(diagram, branch, special):
                     near.append(diagram.locus(special, asked[0], asked[1:]))

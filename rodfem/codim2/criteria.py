@@ -275,9 +275,7 @@ class Singular(Criterion):
         self.scale, self.metric = solver.inertia.scale, solver.inertia.metric
         self.frequencies = NonsymmetricSolver(solver.system) if near.left else None
         self.others = UNSTABLE if near.left else VANISHED
-        self.broken = (
-            f"{plane.names[1]} is an imperfection that destroys the branch point, or is one on this mesh alone"
-        )
+        self.broken = f"{plane.names[1]} is an imperfection that destroys the branch point, or one on this mesh alone"
 
     def length(self, dp: np.ndarray, dx: PETSc.Vec) -> float:
         """Size of a step: parameters over the widths of their bounds, the state in the metric."""

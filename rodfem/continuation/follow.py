@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver, Step, lagrange, predict
-from rodfem.errors import ConvergenceError, InputError
+from rodfem.errors import ConvergenceError, InputError, many
 from rodfem.fem.newton import VIOLATED, violation
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
@@ -58,9 +58,7 @@ class StepControl:
         if whole(StepControl.most)("most", self.most) < 1:
             raise InputError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
         if not self.smallest < self.largest <= 1:
-            raise InputError(
-                f"A step of {self.largest:g} is out of bounds: choose more than {self.smallest:g}, at most 1."
-            )
+            raise InputError(f"A step of {self.largest:g} is out of bounds: give {self.smallest:g} to 1.")
         if 0 < self.first < self.smallest:
             raise InputError(f"A first step of {self.first:g} is out of bounds: choose {self.smallest:g} or more.")
         for name in ("first", "smallest", "aim"):
@@ -236,7 +234,8 @@ class _Walk:
         if self._step < min(self.steps.smallest, 0.01 * most):
             system, why = self.solver.system, f"steps below {self.steps.smallest:g}"
             if last.zero > (drifts := system.active_drifts(last.x)):
-                why += f"; {last.zero - drifts} eigenvalues vanish there to working accuracy"
+                vanish = many(last.zero - drifts, "eigenvalue vanishes", "eigenvalues vanish")
+                why += f"; {vanish} there to working accuracy"
             self.ended = f"no convergence at {system.scene.load} = {last.load:.6g} ({why}{self._missed})"
 
 

@@ -162,9 +162,7 @@ class Plan:
             if asked and not self.at:
                 raise InputError(f"{words}: give them in Plan(at=...).")
         if self.modes and self.method in METHODS and not find(self.method).finds_modes:
-            raise InputError(
-                "Counting alone finds no modes: leave out Plan(modes=...), or name another Plan(method=...)."
-            )
+            raise InputError("Counting alone finds no modes: leave out Plan(modes=...) or give Plan(method=...).")
 
     @staticmethod
     def _check_accuracy(accuracy: float, scene: Scene) -> None:

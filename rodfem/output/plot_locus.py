@@ -43,9 +43,7 @@ def draw_locus(loci: Sequence[Locus], path: Path) -> Path:
     none.
     """
     if len({tuple(one["parameters"]) for one in loci}) != 1:
-        raise ValueError(
-            "There is no locus, or they are of different parameters: give at least one, or draw them one by one."
-        )
+        raise ValueError("There is no locus, or they are of different parameters: give one, or draw them apart.")
     for one in loci:
         LOCUS.check(one, "The locus", ("parameters", "columns", "marks", "start", "labels", "discretization"))
     with matplotlib.rc_context(STYLE):

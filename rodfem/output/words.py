@@ -312,9 +312,7 @@ def _of_rates(negative: int, found: Sequence[Sequence[float]]) -> Words:
     if not negative:
         return Words(STABLE, "0", f"Stable: all of the {len(found)} motions found decay.")
     growing = sum(1 for real, imaginary in found if real < 0.0 and imaginary)
-    return Words(
-        UNSTABLE, str(negative), f"Unstable: {many(negative, 'motion')} grow, {growing} of them by oscillations."
-    )
+    return Words(UNSTABLE, str(negative), f"Unstable: {many(negative, 'motion')} grow, {growing} by oscillations.")
 
 
 def _of_frequencies(negative: int, omega2: Sequence[Sequence[float]]) -> Words:

@@ -149,9 +149,7 @@ class Drag:
         return (*self.turning(c), *([self.along(c)] if self.along else []))
 
 
-AT_A_POINT = Role(
-    "ordinate", "of(r, q)", hint="it receives arrays r (3,) and q (4,), and returns a number", returns=plain
-)
+AT_A_POINT = Role("ordinate", "of(r, q)", hint="it gets arrays r (3,) and q (4,) and returns a number", returns=plain)
 ALONG_THE_ROD = Role("ordinate along the rod", "of(x, c)", along=True)
 
 
@@ -194,9 +192,7 @@ def rotations(values: Any) -> np.ndarray:
     return np.where(other[:, None], q / np.where(other, norm, 1.0)[:, None], q)
 
 
-START = Role(
-    "start", "start(s)", hint="it receives an array of arclengths (m,), and returns one (m, 4)", returns=rotations
-)
+START = Role("start", "start(s)", hint="it gets an array of arclengths (m,) and returns one (m, 4)", returns=rotations)
 
 
 class Part(NamedTuple):

@@ -49,9 +49,7 @@ def check_inertia(scene: Scene) -> None:
     """Raise :class:`SceneError` for masses that cannot be, at any load, and for one that is attached to drag."""
     heavy = [x.s for x in scene.attachments if x.mass or x.rotary_inertia]
     if heavy and scene.inertia.order == 1:
-        raise SceneError(
-            f"A mass is attached at s = {heavy[0]:g} to a rod with drag: leave it out, or give an Inertia."
-        )
+        raise SceneError(f"A mass is attached at s = {heavy[0]:g} to a rod with drag: leave it out or give an Inertia.")
     for load in (None, *scene.loads()) if scene.inertia_depends_on_load else (None,):
         if trouble := trouble_with_inertia(scene, load):
             raise SceneError(trouble)

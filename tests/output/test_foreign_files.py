@@ -1,6 +1,7 @@
 """Files that are corrupt, cut off, foreign or of another version: refused in one sentence by every reader."""
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -152,6 +153,18 @@ def without(name: str) -> Callable[[h5py.File], None]:
     return lambda file: file.__delitem__(name)
 
 
+def hollow(file: h5py.File) -> None:
+    """45 GB of zeros, of which nothing is stored."""
+    del file[f"{HERE}/r"]
+    file.create_dataset(f"{HERE}/r", shape=(200_000, 20_000, 3), chunks=(1000, 100, 3), compression="gzip")
+
+
+def pipe(path: Path) -> None:
+    """What a reader waits for, for ever."""
+    path.unlink()
+    os.mkfifo(path)
+
+
 def entries(folder: Path, *path: str | int, to: Any = ...) -> None:
     data = json.loads((folder / "diagram.json").read_text())
     changed(*path, to=to)(data)
@@ -164,12 +177,16 @@ PROGRAMS: list[tuple[Callable[[Path], None], str, str]] = [
     (lambda bad: entries(bad, "scene"), "info view", "has no scene"),
     (lambda bad: entries(bad, "branches", 0, "columns", "negative"), "info", "'negative'"),
     (lambda bad: entries(bad, "meshes", to=[3]), "info", "diagram.json"),
+    (lambda bad: spoil(bad / "states.h5", hollow), "view convert load", "of the array branches/straight/r a part only"),
+    (lambda bad: pipe(bad / "states.h5"), "view convert load", "regular file"),
+    (lambda bad: pipe(bad / "diagram.json"), "info view convert load", "regular file"),
     (lambda bad: (bad / "states.h5").write_bytes(b"HDF"), "view convert load", "states.h5"),
 ]
 
 
 @pytest.mark.parametrize(("change", "commands", "words"), PROGRAMS)
 def test_programs(change: Callable[[Path], None], commands: str, words: str, bad: Path, capfd: Any) -> None:
+    """A sentence without a wait: nothing is read that is larger than its file, or no file."""
     change(bad)
     for command in commands.split():
         if command == "load":
