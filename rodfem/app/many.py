@@ -186,9 +186,7 @@ def _columns_of(scene: Scene, over: Mapping[str, Sequence[float]]) -> dict[str, 
     """Values of each constant; raises :class:`InputError` for what is none, and for a value that is not admissible."""
     values = {name: np.array(reals(f"over[{name!r}]", column, (0.5, 1.0))) for name, column in over.items()}
     if not values or scene.load in values or not all(map(len, values.values())):
-        raise InputError(
-            f"over is {over!r}: give values of constants other than the load, as in {{'A': (-1.5, -1.0)}}."
-        )
+        raise InputError(f"over is {over!r}: give values of constants other than the load, as in {{'A': (-2, -1)}}.")
     for name, column in values.items():
         scene.check_constant(name)
         for value in column.tolist():

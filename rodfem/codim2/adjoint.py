@@ -202,7 +202,7 @@ def state_derivative(
         tangent = solver.load_tangent(there, increasing=True)
         slope = system.scalar(tangent)
         if not slope > TINY:
-            raise ConvergenceError(f"The state at {scene.load} = {load:.8g} is singular, and has no derivative.")
+            raise ConvergenceError(f"The state at {scene.load} = {load:.8g} is singular and has no derivative.")
         parts = [weight / slope * of(there + tangent * place) for place, weight in DIFFERENCES]
     return np.asarray(sum(parts))
 
@@ -225,9 +225,7 @@ def ordinate_density(solver: BranchSolver, x: PETSc.Vec, parameter: str, pieces:
     system.set_phase(x)
     system.at(x).factor(solver.axis)
     if not system.solve(gradient, a):
-        raise ConvergenceError(
-            f"The state at {scene.load} = {system.scalar(x):.8g} is singular, and has no derivative."
-        )
+        raise ConvergenceError(f"The state at {scene.load} = {system.scalar(x):.8g} is singular and has no derivative.")
     size, parts = abs(values[parameter]) or 1.0, np.zeros(())
     for place, weight in DIFFERENCES:
         changed = {**values, parameter: values[parameter] + place * size, scene.load: 0.0}

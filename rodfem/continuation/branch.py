@@ -370,7 +370,8 @@ class Branch:
 
     def __repr__(self) -> str:
         """Name, size and end."""
-        return f"<Branch {self.name!r}: {len(self.points)} points, {len(self.special)} special, ended: {self.ended}>"
+        points = many(len(self.points), "point")
+        return f"<Branch {self.name!r}: {points}, {len(self.special)} special, ended: {self.ended}>"
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Column (P,) of an attribute of its points, nan where it is not known; raises :class:`KeyError`."""

@@ -29,7 +29,7 @@ from rodfem.diagram.explorer import Explorer
 from rodfem.diagram.plan import EQUATIONS, Plan, entries, plan_of
 from rodfem.diagram.solver import MESH, METHOD, POINT, RANKS, SCENE, Solver, state_of
 from rodfem.diagram.sweep import Sweep
-from rodfem.errors import InputError
+from rodfem.errors import InputError, many
 from rodfem.fem import form_compiler
 from rodfem.fem.fields import Discretization
 from rodfem.fem.fingerprint import fingerprint
@@ -362,11 +362,9 @@ class Diagram:
 
     def __repr__(self) -> str:
         low, high = self.span
-        points = sum(len(b.points) for b in self.branches)
-        return (
-            f"<Diagram of {self.scene.name!r}: {len(self)} branches, {points} points, {len(self.special())} special "
-            f"points, {self.scene.load} from {low:g} to {high:g}>"
-        )
+        points = many(sum(len(b.points) for b in self.branches), "point")
+        size = f"{many(len(self), 'branch', 'branches')}, {points}, {many(len(self.special()), 'special point')}"
+        return f"<Diagram of {self.scene.name!r}: {size}, {self.scene.load} from {low:g} to {high:g}>"
 
     def _repr_html_(self) -> str:
         """Table of special points for notebooks."""

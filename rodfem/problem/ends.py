@@ -197,9 +197,7 @@ class End(Contribution):
         for c in map(scene.constants, scene.loads() if callable(self.rotation) else scene.span[:1]):
             self._check_rotation(where, self.frame(c))
         if self.turning == HELD and (self.moment or self.follower_moment):
-            raise SceneError(
-                f"A moment acts on the {where}, whose directors are held: leave them free, or use a hinge."
-            )
+            raise SceneError(f"A moment acts on the {where}, whose directors are held: leave them free or use a hinge.")
         for c in map(scene.constants, scene.loads()):
             self._check_force(where, c)
             self._check_moments(where, c)
@@ -449,8 +447,16 @@ def sliding_hinge(
         raise SceneError(f"The direction in which a hinge slides is {what}: give one, as in along=(0.6, 0.0, 0.8).")
     direction = np.where(abs(direction) > NEGLIGIBLE * largest, direction / largest, 0.0)
     unit = tuple((direction / np.linalg.norm(direction)).tolist())
-    push = force if force is None else lambda c: tuple(t * value_of(force, c) for t in unit)
+    push = force if force is None else lambda c: tuple(t * _one_number(value_of(force, c)) for t in unit)
     return SlidingHinge(position, rotation, push, hinge=axis, guide=unit)
+
+
+def _one_number(force: Any) -> Any:
+    if isinstance(force, (tuple, list, np.ndarray)):
+        raise SceneError(
+            f"The force of a sliding hinge is {force}: give one number along its guide, as lambda c: -c.P."
+        )
+    return force
 
 
 def circular_guide(

@@ -80,6 +80,7 @@ def test_help_has_what_a_person_calls() -> None:
 def test_a_branch_of_too_many_points_names_the_remedy() -> None:
     steps = rodfem.StepControl(most=5)
     found = rodfem.trace(scene(), depth=0, steps=steps, error_bars=False)
+    assert repr(found).startswith("<Diagram of 'hemitropic': 1 branch, 6 points, 1 special point, lam from")
     words = "straight ends: 5 points reached; use longer steps (StepControl(largest=...)) or more points (StepControl("
     assert any(sentence.startswith(words) for sentence in found.warnings)
 

@@ -171,6 +171,10 @@ def test_a_column_whose_tip_runs_on_a_circle(radius: float) -> None:
         (lambda: circular_guide(1.0, "z"), "across 'z'"),
         (lambda: ball(1.0, "e2"), "leaves the plane across e2"),
         (lambda: sliding_hinge(E2, (0.0, 0.0, 0.0)), "slides is zero"),
+        (
+            lambda: column(clamped(), sliding_hinge(E2, INCLINED, top, force=(0.0, 0.0, -1.0))),
+            "give one number along its",
+        ),
         (lambda: sliding_hinge(E2, (0.0, 1.0)), "along is .*: give 3 numbers"),  # type: ignore[arg-type]
         (lambda: column(clamped(), sliding_hinge(E2, (0.0, 0.6, 0.8), top), planar="e2"), "leaves the plane across e2"),
         (lambda: column(clamped(), sliding_hinge(E2, INCLINED, lambda c: (0.0, None, 1.0))), "has no place"),
