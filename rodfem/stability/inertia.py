@@ -21,7 +21,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rodfem.errors import ConvergenceError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import compiled_newton
 from rodfem.fem.state import State
 from rodfem.fem.symmetries import Phase
@@ -334,7 +334,8 @@ class Factored:
         Block Lanczos for the largest eigenvalues ``nu`` of ``A = S^-1 M`` with full orthogonalisation, restarted with a
         block of ``spare`` vectors more than the ``number`` wanted, first those of the last call, until each has the
         relative ``accuracy``, or what the arithmetic resolves, by its residual in the metric or by its last change.
-        Values are the quotients of ``S`` then.  Factors at the edge of a wide band of round-off are replaced by others.
+        Values are the quotients of ``S`` then, fewer where the mesh has no more.  Factors at the edge of a wide band of
+        round-off are replaced by others.  Raises :class:`InputError` where the mesh has none.
         """
         own, block = self._own(), number + spare
         if own.factored == self._filled and abs(own.shift) > FAR * own.scale:
@@ -352,6 +353,8 @@ class Factored:
                 before = nu[:number]
             images = own.times(vectors)
             theta, z = np.linalg.eigh(own.sum(vectors.T @ images))
+            if not len(theta):
+                raise InputError("The mesh lets the rod move in no way: use more elements, or a higher degree.")
             order = np.argsort(abs(theta + own.shift))
             found = own.system.vectors(vectors @ z[:, order])
         own.vectors = found
@@ -371,13 +374,12 @@ class Factored:
         floor = min(self.inertia.resolution, accuracy * self.inertia.scale)
         allowed = np.maximum(accuracy * abs(wanted), floor * wanted**2)
         left = np.minimum(left, abs(wanted - before))
-        return bool((left <= np.maximum(allowed, ROUNDED * abs(wanted).max())).all())
+        return bool((left <= np.maximum(allowed, ROUNDED * abs(wanted).max(initial=0.0))).all())
 
     def _in_krylov_space(self, block: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Eigenvalues of ``A`` in the space of ``block, A block, ...``, the largest in size first.
 
-        Of as many as there are vectors, returns ``A`` times theirs, orthonormalised, and the residuals of these, both
-        in the metric.  The projection is that of ``A``, whose eigenvalues of interest are outermost.
+        Of as many as there are vectors, returns ``A`` times theirs, orthonormalised, and residuals, both in the metric.
         """
         own, size = self.inertia, block.shape[1]
         basis = duals = images = np.zeros((len(block), 0))
@@ -392,15 +394,13 @@ class Factored:
         projection = own.sum(duals.T @ images)
         nu, z = np.linalg.eigh((projection + projection.T) / 2)
         order = np.argsort(-abs(nu))
+        # what constraints forbid has a nu of round-off: a small mesh has fewer motions than are asked for
+        order = order[abs(nu[order]) > ROUNDED * max(1 / own.scale, abs(nu).max(initial=0.0))]
         nu, z = nu[order], z[:, order[:size]]
         vectors = images @ z
         residuals = own.sizes(vectors - basis @ z * nu[:size])
         return nu, own.extension(vectors, basis[:, :0], basis[:, :0])[0], residuals
 
     def noise(self, mode: PETSc.Vec) -> float:
-        """Round-off in the eigenvalue of a ``mode`` of metric norm 1, to first order.
-
-        Entries ``S_ij`` that err by ``eps |S_ij|`` each, at random, move it by ``eps sqrt(sum (S_ij mode_i
-        mode_j)^2)``; :data:`NOISE` times that is returned.
-        """
+        """Round-off in the eigenvalue of a ``mode`` of metric norm 1: :data:`NOISE` times that of its quotient."""
         return NOISE * rounding(self.matrix, mode, mode)

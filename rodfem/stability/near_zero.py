@@ -183,14 +183,14 @@ def _candidates(found: Factored, limit: float, inside: int, least: int) -> list[
         if not inside + least and abs(found.nearest(1, ROUGH)[0][0]) > CLEAR * limit:
             return None
         values, vectors = found.nearest(number, SOFT)
-        while (abs(values) < limit).all() and number < MANY:
+        while len(values) == number < MANY and (abs(values) < limit).all():
             number *= 2
             values, vectors = found.nearest(number, SOFT)
         # what is far from zero need not be as sharp: the values there lie dense on coarse meshes, and converge slowly
         if close := int((abs(values) < CLEAR * SOFT * inertia.scale).sum()):
             sharp = found.nearest(close, NULL, spare=number - close)
             values, vectors = np.append(sharp[0], values[close:]), [*sharp[1], *vectors[close:]]
-    chosen = np.flatnonzero((abs(values) < limit) | (np.arange(number) < least))
+    chosen = np.flatnonzero((abs(values) < limit) | (np.arange(len(values)) < least))
     if len(chosen) < inside or len(chosen) == number:
         raise ConvergenceError(
             f"{inside} or more eigenvalues are within {limit:.2g} of zero and are not distinct: use fewer elements of "
