@@ -150,8 +150,7 @@ def _vertices(mesh: Any, cells: int) -> np.ndarray:
 
 def cell_vertices(mesh: Any, cells: int) -> np.ndarray:
     """Arclengths of the two vertices of each local cell, in reference order: (cells, 2)."""
-    x = np.asarray(mesh.geometry.x)[:, 0]
-    return x[_vertices(mesh, cells)]
+    return cell_coordinates(mesh, cells)[:, :, 0]
 
 
 def cell_coordinates(mesh: Any, cells: int) -> np.ndarray:

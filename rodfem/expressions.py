@@ -20,7 +20,7 @@ from ufl.utils.stacks import StackDict
 import rodfem.forms  # noqa: F401, before UFL: see rodfem.forms.importing
 
 __all__ = ["Condition", "Expr", "FloatValue", "Indexed", "Label", "MultiFunction"]
-__all__ += ["PositiveRestricted", "Sum", "Variable", "apply_algebra_lowering", "differentiated"]
+__all__ += ["PositiveRestricted", "Sum", "Symbol", "Variable", "apply_algebra_lowering", "differentiated"]
 __all__ += ["evaluated", "extract_coefficients", "extract_type", "map_integrand_dags", "parts"]
 
 
@@ -37,3 +37,26 @@ def evaluated(expression: Any, component: tuple[int, ...] = ()) -> Any:
 def parts(expression: Any) -> Iterator[Any]:
     """All expressions that an expression is made of, itself among them, each once."""
     return unique_pre_traversal(ufl.as_ufl(expression))
+
+
+class Symbol(Variable):  # type: ignore[misc]
+    """An expression that stands for no number until it has a ``value``: ``math.cos`` refuses it."""
+
+    __slots__ = ("name", "value")
+
+    @classmethod
+    def named(cls, name: str, value: float | None = None) -> Symbol:
+        """Return what a person's function knows by this ``name``."""
+        symbol = cls(ufl.as_ufl(0.0))
+        symbol.name, symbol.value = name, value
+        return symbol
+
+    def evaluate(self, *_: Any, **__: Any) -> float:
+        """Return the value; raises :class:`TypeError` if there is none."""
+        if self.value is None:
+            raise TypeError("a constant is an expression of UFL")
+        return float(self.value)
+
+    def __repr__(self) -> str:
+        """Name, as a dictionary has it in its words on a key that it lacks."""
+        return self.name

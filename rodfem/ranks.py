@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from math import inf
 from types import TracebackType
 from typing import TYPE_CHECKING, NoReturn
 
@@ -42,10 +43,7 @@ def on_first(comm: MPI.Comm, check: Callable[[], object]) -> None:
             check()
         except InputError as error:
             trouble = error
-    done, pause = comm.Ibarrier(), SHORTEST
-    while not done.Test():
-        time.sleep(pause)
-        pause = min(2.0 * pause, PAUSE)
+    all_come(comm, inf)
     trouble = comm.bcast(trouble)
     if trouble is not None:
         raise trouble
@@ -58,13 +56,14 @@ def agree(comm: MPI.Comm, **given: object) -> None:
         raise InputError(f"The ranks of this job have different input ({', '.join(other)}): give all of them the same.")
 
 
-def all_come(comm: MPI.Comm) -> bool:
+def all_come(comm: MPI.Comm, patience: float = PATIENCE) -> bool:
     """Whether all ranks come here, as they do where they raise the same error; False for one that waits in vain."""
-    here, end = comm.Ibarrier(), time.monotonic() + PATIENCE
+    here, end, pause = comm.Ibarrier(), time.monotonic() + patience, SHORTEST
     while not here.Test():
         if time.monotonic() > end:
             return False
-        time.sleep(PAUSE)
+        time.sleep(pause)
+        pause = min(2.0 * pause, PAUSE)
     return True
 
 

@@ -17,7 +17,7 @@ class Clock:
         self.seconds = defaultdict[str, float](float)
         self.started = perf_counter()
         self._running: list[str] = []
-        self._scope = self._next = ""
+        self._scope = ""
         self._mark = self.started
 
     def _charge(self) -> None:
@@ -26,18 +26,16 @@ class Clock:
             self.seconds[running[-1]] += now - self._mark
         self._mark = now
 
-    def __call__(self, name: str) -> Clock:
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
         """Measure a block under ``name``."""
-        self._next = name
-        return self
-
-    def __enter__(self) -> None:
         self._charge()
-        self._running.append(self._scope or self._next)
-
-    def __exit__(self, *trouble: object) -> None:
-        self._charge()
-        self._running.pop()
+        self._running.append(self._scope or name)
+        try:
+            yield
+        finally:
+            self._charge()
+            self._running.pop()
 
     @contextmanager
     def scope(self, name: str) -> Iterator[None]:

@@ -34,6 +34,7 @@ from rodfem.adaptivity.grading import SmoothnessIndicator
 from rodfem.continuation.arc import STEADY, Arc, nearest_event, stepped
 from rodfem.continuation.branch import NormalForm, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import zero_between
 from rodfem.continuation.kinds import END, FOLD
 from rodfem.continuation.normal_form import Origin, alike, normal_form_of, ordinate_along
 from rodfem.continuation.singular import SingularSystem, load_uncertainty
@@ -41,11 +42,9 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import HIGHEST
 from rodfem.fem.newton import correct
 from rodfem.fem.resultants import NAMES
-from rodfem.fem.shape import Shape, halved, richer_system, transferred
-from rodfem.fem.system import System
+from rodfem.fem.shape import Shape, halved, richer, transferred
 from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.problem.events import Event, Level
-from rodfem.roots import zero_between
 from rodfem.tolerances import INSIDE, ROUND_OFF, round_off, same_place, unit
 
 RESOLVED_TO = 0.1
@@ -118,8 +117,8 @@ class OrdinateBound:
         of = self.richer.system.scene.ordinate
         r, q = self.richer.place(second, of.s or 0.0)
         value, largest = float(of.of(r, q)), 0.0
-        for s, weights, richer in self._tried:
-            before, after = self.coarse.place(first, s, weights), self.richer.place(second, s, richer)
+        for s, weights, finer in self._tried:
+            before, after = self.coarse.place(first, s, weights), self.richer.place(second, s, finer)
             turned = q + after[1] - before[1]
             moved = of.of(r + after[0] - before[0], turned / np.sqrt(turned @ turned))
             largest = max(largest, abs(float(moved) - value))
@@ -156,7 +155,7 @@ class Enriched:
     """A second, richer mesh of the system of a solver, and its estimates."""
 
     def __init__(self, solver: BranchSolver) -> None:
-        self.coarse, self.system = solver, richer_system(solver.system)
+        self.coarse, self.system = solver, solver.system.on_mesh(richer(solver.system))
         self.solver = BranchSolver(self.system)
         self.transfer = partial(transferred, solver.shape, self.system)
         self.origins: list[tuple[SpecialPoint, RicherPoint]] = []
@@ -318,11 +317,11 @@ def end_at_zero_stretch(solver: BranchSolver, last: Point, *, error_bars: bool) 
 
 def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
     """Sharpen an end at which the smallest stretch vanishes; raises :class:`ConvergenceError` if that fails."""
-    system, d = solver.system, solver.system.fields.discretization
+    d = solver.system.fields.discretization
     sample, found = solver.shape.sample(end.point.x), list[Point]()
     for factor in (2, 4):
         mesh = d.finer(factor, richer=int(d.degree < HIGHEST))  # the forms of :class:`Enriched` serve
-        fine = BranchSolver(System(system.scene, mesh, system.comm, system.clock, symmetries=system.symmetries))
+        fine = solver.on_mesh(mesh)
         x = _vanishing(fine, fine.shape.restore(sample), end.point)
         point = replace(end.point, x=x, tangent=None, load=fine.system.scalar(x), energy=fine.energy(x))
         found.append(replace(point, ordinate=fine.shape.ordinate(x), stretch=fine.shape.stretch(x)))

@@ -13,17 +13,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.fem.fields import Discretization, Fields
 from rodfem.fem.formulations import turning_of
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch_solver import BranchSolver
 
 FIXED, PER_DEGREE = 600.0, 0.27
 """Cost of a point of a branch with n unknowns of degree d is as ``FIXED + n (1 + PER_DEGREE d)``: measured, cord."""

@@ -8,7 +8,7 @@ has a mesh made for that state, carries the last points over, and goes on.  Ever
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from math import inf, isfinite, isnan, log10
 
@@ -26,7 +26,6 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import correct
 from rodfem.fem.symmetries import may_slide
-from rodfem.fem.system import System
 from rodfem.problem.scene import Scene
 from rodfem.stability.inertia import ROUGH
 from rodfem.tolerances import SAME_LOAD, TINY, unit
@@ -68,18 +67,6 @@ class TooCoarse(Exception):
         return self.why or f"estimated error {self.error:.0e}"
 
 
-def interpolated(point: Point, target: BranchSolver) -> Point:
-    """Point with its state and tangent interpolated, not solved, on another mesh; itself if it is on that."""
-    if point.mesh == target.mesh:
-        return point
-    assert point.solver is not None
-    source, tangent = point.solver.shape, None
-    x = target.shape.restore(source.sample(point.x))
-    if point.tangent is not None:
-        tangent = target.shape.restore(source.sample(point.x + point.tangent)) - x
-    return replace(point, x=x, tangent=tangent, mesh=target.mesh, solver=target)
-
-
 class Meshes:
     """The solvers of one run, by the number of their mesh, and their richer companions, made when needed."""
 
@@ -111,16 +98,15 @@ class Meshes:
     def add(self, mesh: Discretization) -> BranchSolver:
         """Solver on another ``mesh``."""
         first = self.solvers[0]
-        s = first.system
-        with s.clock("setup"):
-            new = BranchSolver(System(s.scene, mesh, s.comm, s.clock, symmetries=s.symmetries), first.modes)
+        with first.system.clock("setup"):
+            new = first.on_mesh(mesh)
         new.mesh = len(self.solvers)
         self.solvers.append(new)
         return new
 
     def _carried(self, point: Point, target: BranchSolver, fixed_load: bool) -> Point | None:
         """Point solved on another mesh, on the plane across its tangent or at its load; None where that fails."""
-        guess = interpolated(point, target)
+        guess = target.interpolated(point)
         if guess.tangent is None:
             return None
         x, row = guess.x, target.row(guess.tangent)

@@ -24,15 +24,16 @@ from dataclasses import replace
 from functools import cache, partial
 from itertools import compress, groupby
 from math import inf, isfinite
+from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, RicherPoint
-from rodfem.adaptivity.mesh_sequence import Meshes
 from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
-from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import VERTICAL
 from rodfem.continuation.kinds import FOLD, NUMBER
 from rodfem.continuation.observer import Remark
 from rodfem.errors import ConvergenceError
@@ -42,6 +43,9 @@ from rodfem.stability.inertia import NULL, ROUGH, Factored
 from rodfem.stability.motion_names import names_for
 from rodfem.stability.near_zero import SPARE, NearZero, decide, near_zero, quotients, soft_limit
 from rodfem.stability.soft_mode import SoftMode, index_range
+
+if TYPE_CHECKING:
+    from rodfem.adaptivity.mesh_sequence import Meshes
 
 FINER, EXACT = "use more elements or a higher degree", "no mesh decides that, it is within round-off"
 FEW = 4

@@ -23,7 +23,6 @@ from rodfem.ranks import all_come, in_words, listen
 
 NEEDED = ("ufl", "dolfinx", "petsc4py", "slepc4py", "mpi4py", "numpy", "scipy", "h5py", "matplotlib")
 
-
 if missing := [name for name in NEEDED if find_spec(name) is None]:
     sys.stderr.write(
         f"error: {sys.executable} has no module {', '.join(missing)}: install what is missing by 'pip install "
@@ -34,7 +33,6 @@ if missing := [name for name in NEEDED if find_spec(name) is None]:
 os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
 os.environ["PETSC_OPTIONS"] = f"{os.environ.get('PETSC_OPTIONS', '')} -no_signal_handler"  # a closed pipe is no error
 listen()
-
 
 ARGUMENT = re.compile(r"\b(?:Discretization|Plan|StepControl|run)\((\w+)=([^()]*)\)")
 """An argument in a sentence: its name and its value."""

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rodfem.codim2.rods import NUMBERS, Rods, continued
+from rodfem.codim2.neighbours import NUMBERS, Rods, continued
 from rodfem.diagram.diagram import MESH, PLAN, trace
 from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import RANKS, SCENE
@@ -68,9 +68,7 @@ def many(
     :class:`InputError` where ``folder`` cannot be written, is in use by another process, or has a result in another
     format, and where ``work`` returns anything else.
     """
-    return shared(
-        [key_of(scene) for scene in scenes], [partial(work, scene) for scene in scenes], folder, comm, progress
-    )
+    return shared([*map(key_of, scenes)], [partial(work, scene) for scene in scenes], folder, comm, progress)
 
 
 def shared(
@@ -160,7 +158,7 @@ def family(
     by their loads: ``kind``, ``critical_load``, its ``error``, ``ordinate``, ``index_before`` and ``index_after``, nan
     beyond their number.  ``first_loss`` is the load at which the first branch loses its stability, nan if it does not
     or begins unstable.  Where a rod fails, ``trouble`` is the sentence.  Rods are continued from their neighbours where
-    these have the same special points (:mod:`rodfem.codim2.rods`), else traced.
+    these have the same special points (:mod:`rodfem.codim2.neighbours`), else traced.
 
     ``folder``, and ``comm`` and ``progress`` of ``sharing``, by default a bar on a terminal, are as for :func:`many`,
     which keeps each rod in a file: an interrupted family goes on, and ranks share it; another plan or

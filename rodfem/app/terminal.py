@@ -135,8 +135,7 @@ class Report(Observer):
 
     def _ignored(self, scene: Scene) -> None:
         """Say which terms of the stored energy count for nothing in a rod of that kind, and in which they would."""
-        ignored = scene.ignored_strains
-        if not ignored:
+        if not (ignored := scene.ignored_strains):
             return
         wanted = {*scene.free_strains, *ignored}
         kind = min((rod for rod, free in RODS.items() if wanted <= set(free)), key=lambda rod: len(RODS[rod]))
@@ -242,11 +241,8 @@ class Report(Observer):
         """Print the square roots of the left-most eigenvalues, or rates, at about ten loads, if the scene has them."""
         points, order = [p for b in branches for p in b.points if p.omega2], scene.inertia.order
         if points:
-            heads = (
-                "Rates of decay against",
-                "Frequencies omega, the square roots of the left-most eigenvalues, against",
-            )
-            self.say(f"\n{heads[order - 1]} {scene.load} (errors not estimated)")
+            heads = "Rates of decay", "Frequencies omega, the square roots of the left-most eigenvalues,"
+            self.say(f"\n{heads[order - 1]} against {scene.load} (errors not estimated)")
             self._frequencies(points[:: max(1, (len(points) - 1) // 10)], scene.load, order)
 
     def _frequencies(self, shown: Sequence[Point], load: str, order: int) -> None:

@@ -25,7 +25,8 @@ from itertools import chain
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch_solver import ROWS, BranchSolver, cubic_weights, lagrange
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import ROWS, cubic_weights, lagrange
 from rodfem.continuation.singular import SHARP, SPLIT, Curve, Linear, Section, SingularState, SingularSystem, Vectors
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.state import Line, line
@@ -368,7 +369,8 @@ class Collision(Criterion):
 
     def correct(self, guess: Guess, near: LocusPoint, reach: float = 1.0) -> LocusPoint:
         """See :class:`Criterion`; raises :class:`Destroyed` if pairs that met at once do not any more."""
-        plane, system, basis = self.plane, self.solver.system, _basis(near)
+        plane, system = self.plane, self.solver.system
+        basis = np.stack([v.array_r.real for v in near.modes], axis=1)  # of the invariant subspace, this rank's rows
         forward = guess[2] / plane.width / np.linalg.norm(guess[2] / plane.width)
         across = np.array([-forward[1], forward[0]]) * plane.width
         system.line = plane.line(guess[0], across)
@@ -507,8 +509,3 @@ def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[
     overlap = np.array([[(metric * v).dot(w) for w in left] for v in right])
     u, _, vt = np.linalg.svd(overlap)
     return right, [combine(left, column) for column in (vt.T @ u.T).T]
-
-
-def _basis(near: LocusPoint) -> np.ndarray:
-    """Basis (n, size) of the invariant subspace at a point, this rank's n unknowns."""
-    return np.stack([v.array_r.real for v in near.modes], axis=1)

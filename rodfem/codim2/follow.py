@@ -38,7 +38,8 @@ from rodfem.codim2.criteria import (
 from rodfem.codim2.locus import Locus, Mark, Row
 from rodfem.codim2.points import Codim2Points, place
 from rodfem.continuation.branch import SpecialPoint
-from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import ALIGNED, ROWS
 from rodfem.continuation.follow import StepControl
 from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, DIVERGENCE, FLUTTER, FOLD, GAP, KINDS
 from rodfem.errors import ConvergenceError, InputError
@@ -68,8 +69,7 @@ class Half:
         self.criterion, self.plane = points.criterion, points.plane
         self.nodes, self.steps = [start], [start]  # these without what lies between two steps
         self.marks, self.ended = dict[int, str](), start.ended
-        over = self.plane.outside(start.p + INSIDE * start.dp)
-        if over is not None:
+        if over := self.plane.outside(start.p + INSIDE * start.dp):
             self.ended = self.ended or self._bound(*over)
 
     def run(self, control: StepControl) -> Half:

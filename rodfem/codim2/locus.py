@@ -120,7 +120,6 @@ class Locus:
     def _of_scene(self) -> dict[str, Any]:
         """What a file says of the scene."""
         scene = self.system.scene
-        constants = {name: p.value for name, p in scene.parameters.items() if name not in self.names}
         own = [scene.parameters[name] for name in self.names]
         return {
             "scene": scene.name,
@@ -128,7 +127,7 @@ class Locus:
             "ordinate_name": scene.ordinate.name,
             "natural": scene.units.ordinate,
             "planar": bool(scene.planar),
-            "constants": constants,
+            "constants": {name: p.value for name, p in scene.parameters.items() if name not in self.names},
             "discretization": mesh_of(self.system),
             "labels": [p.label or name for name, p in zip(self.names, own, strict=True)],
             "words": [p.words for p in own],

@@ -29,12 +29,11 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 
 from rodfem.codim2.criteria import Criterion, LocusPoint, Plane, Sought, interpolant
-from rodfem.continuation.branch_solver import lagrange
+from rodfem.continuation.curves import lagrange, zero_between
 from rodfem.continuation.kinds import GAP
 from rodfem.errors import ConvergenceError
 from rodfem.linalg.orthogonal import combine
 from rodfem.output.words import number
-from rodfem.roots import zero_between
 from rodfem.tolerances import TINY
 
 WINDOWS = tuple(0.064 / 2**i for i in range(11))  # half widths of windows, as arclengths, from wide to narrow

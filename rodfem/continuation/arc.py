@@ -18,15 +18,15 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import groupby, pairwise
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import ALIGNED, BranchSolver, cubic, interpolant
-from rodfem.continuation.branch_solver import Knot as Row
 from rodfem.continuation.crossings import Node, clear, places
+from rodfem.continuation.curves import ALIGNED, cubic, interpolant, zero_between
+from rodfem.continuation.curves import Knot as Row
 from rodfem.continuation.kinds import EVENT, LEVEL, Kind
 from rodfem.errors import SMALLER_STEPS, ConvergenceError, SceneError
 from rodfem.fem.checks import Convexity
@@ -34,9 +34,11 @@ from rodfem.fem.newton import correct, linear_step
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import generic
 from rodfem.problem.events import Event, Level
-from rodfem.roots import zero_between
 from rodfem.stability.reduced_stiffness import Condensation, ReducedStiffness
 from rodfem.tolerances import INSIDE, ROUND_OFF, TINY
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch_solver import BranchSolver
 
 STEADY = 3.0
 """Uncertainty of a result, in units of its change by one more step of Newton's method."""
@@ -278,7 +280,8 @@ class Piece(Chord):
         return next((p.s + t * (q.s - p.s) for t in places(a, b, 1)), None)
 
 
-class End(NamedTuple):
+@dataclass(eq=False)
+class End:
     """An end of a piece: a state with its unit tangent."""
 
     arclength: float

@@ -1,8 +1,4 @@
-"""Equilibria at given loads and along branches: predictions, steps, tangents, and the index and records of each state.
-
-*Predictions* are polynomials through the last rows of a branch, or between two rows with their tangents.  Of a scene
-with symmetries the rows are states of some orbits.  Where they are on these is arbitrary: a prediction stays where the
-last row is.
+"""Equilibria at given loads and along branches: steps, tangents, and the index and records of each state.
 
 *Tangent and index of a regular point* are those of one symmetric factorisation at that state.  With ``F_lam``, the
 derivative of the equations in the load, ``z = (-S^-1 F_lam, 1)`` is a tangent, and the inertia of the factors of the
@@ -16,26 +12,26 @@ too near zero, the tangent is by LU factors of the bordered matrix, and two shif
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.curves import across_orbit, predict
 from rodfem.continuation.kinds import Kind
 from rodfem.continuation.natural_shape import natural_shape, sampled, uniform_turn
 from rodfem.errors import ConvergenceError, SceneError
 from rodfem.fem.checks import Convexity
+from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
 from rodfem.fem.resultants import NAMES, Reactions, Resultants, reactions
 from rodfem.fem.shape import Shape
 from rodfem.fem.state import LOAD, Energies, NodalValues, State
 from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
-from rodfem.linalg.orthogonal import combine
 from rodfem.problem.units import Units
 from rodfem.stability.in_space import InSpace
 from rodfem.stability.inertia import DOUBTFUL, Index, Inertia
@@ -43,103 +39,6 @@ from rodfem.stability.near_zero import decide
 from rodfem.stability.pencil import least_eigenvalue
 from rodfem.stability.symmetric import SymmetricSolver
 from rodfem.tolerances import TINY, round_off
-
-VERTICAL = 1e-8
-"""Slope of the load (in spans per unit of arclength) below which it counts as constant along a branch."""
-ALIGNED = 0.9
-"""Least cosine between the direction of a prediction and the tangent at the corrected point."""
-ROWS = 4
-"""Rows of a branch that a prediction extrapolates, at most."""
-
-
-class Knot(Protocol):
-    """A state of a curve."""
-
-    @property
-    def arclength(self) -> float:
-        """Its place."""
-
-    @property
-    def x(self) -> PETSc.Vec:
-        """The state."""
-
-    @property
-    def tangent(self) -> PETSc.Vec | None:
-        """The derivative of the curve, where it is known."""
-
-
-def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Weights of the values at ``nodes`` in their interpolating polynomial at ``s``, and in its derivative there."""
-    known = [float(x) for x in nodes]
-    value, slope = np.empty(len(known)), np.empty(len(known))
-    for j, node in enumerate(known):
-        p, dp, scale = 1.0, 0.0, 1.0
-        for i, other in enumerate(known):
-            if i != j:
-                dp = dp * (s - other) + p
-                p *= s - other
-                scale *= node - other
-        value[j], slope[j] = p / scale, dp / scale
-    return value, slope
-
-
-def predict(points: Sequence[Point], s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """State and direction at arclength ``s``: of the cubic of the last two points, or the last one and its tangent."""
-    if len(points) > 1:
-        return interpolant(points[-2], points[-1], s)
-    last = points[-1]
-    assert last.tangent is not None
-    return combine([last.x, last.tangent], np.array([1.0, s - last.arclength])), last.tangent.copy()
-
-
-def predict_at_load(system: System, points: Sequence[Point], load: float) -> PETSc.Vec:
-    """Extrapolate equilibria at loads, the last of some ``points``, to another ``load``.
-
-    Of a scene with symmetries it is the line through two: a polynomial of higher degree would magnify, from load to
-    load, where these are on their orbits.
-    """
-    recent = points[-2 if system.drifts else -ROWS :]
-    return combine([p.x for p in recent], lagrange(np.array([p.load for p in recent]), load)[0])
-
-
-def cubic(ends: list[PETSc.Vec], h: float, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """Cubic of length ``h`` at ``s``, and its derivative, by the ``ends``: value and derivative of each."""
-    value, slope = cubic_weights(h, s)
-    return combine(ends, value), combine(ends, slope)
-
-
-def cubic_weights(h: float, s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Weights (4,) of values and slopes at both ends in their cubic of length ``h`` at ``s``, and in its derivative."""
-    t = s / h
-    value = np.array([(1 + 2 * t) * (1 - t) ** 2, h * t * (1 - t) ** 2, t * t * (3 - 2 * t), h * t * t * (t - 1)])
-    return value, np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
-
-
-def interpolant(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
-    """State and direction at ``s`` on the polynomial of least degree through two states and what tangents they have."""
-    h = b.arclength - a.arclength
-    if a.tangent is not None and b.tangent is not None:
-        return cubic([a.x, a.tangent, b.x, b.tangent], h, s - a.arclength)
-    way = (b.x - a.x) * (1.0 / h)
-    for end, sign in ((a, 1.0), (b, -1.0)):
-        if end.tangent is not None:
-            d, bend = s - end.arclength, (way - end.tangent) * (sign / h)
-            return combine([end.x, end.tangent, bend], np.array([1.0, d, d * d])), end.tangent + bend * (2 * d)
-    return a.x + way * (s - a.arclength), way
-
-
-def across_orbit(system: System, last: PETSc.Vec, x: PETSc.Vec, direction: PETSc.Vec) -> None:
-    """Take from a prediction ``x`` and its ``direction``, in place, what moves the ``last`` state along its symmetries.
-
-    The phase conditions of a row are those of its prediction, and leave such a part as it is; extrapolations would hand
-    it on until it is most of a step.  The motions of the ``system`` are orthonormal in the metric.
-    """
-    system.set_phase(last)
-    phase, generators = system.phase, system.at(last).generators
-    for i, weights in phase.broken.items():
-        motion, condition = system.new_vector(weights @ generators), phase.conditions[i]
-        x.axpy(phase.offsets[i] - condition.dot(x), motion)
-        direction.axpy(-condition.dot(direction), motion)
 
 
 @dataclass(frozen=True)
@@ -216,6 +115,10 @@ class BranchSolver:
         """Tabulate the shape; with ``spectrum`` record that many left-most eigenvalues."""
         self.system, self.mesh, self.modes = system, 0, spectrum  # mesh: number of this one among several
         self.shape, self.axis = Shape(system), system.load_axis()
+
+    def on_mesh(self, mesh: Discretization) -> BranchSolver:
+        """Solver of the same rod on another ``mesh``."""
+        return BranchSolver(self.system.on_mesh(mesh), self.modes)
 
     @property
     def conservative(self) -> bool:
@@ -344,6 +247,16 @@ class BranchSolver:
         outcome = correct(self.system, x, self.axis, reach)
         self.system.set_load(x, load)  # steps at fixed load may have moved it by round-off
         return x, outcome
+
+    def interpolated(self, point: Point) -> Point:
+        """Point of another mesh with its state and tangent interpolated, not solved; itself if it is of this one."""
+        if point.mesh == self.mesh:
+            return point
+        source, tangent = point.own_solver.shape, None
+        x = self.shape.restore(source.sample(point.x))
+        if point.tangent is not None:
+            tangent = self.shape.restore(source.sample(point.x + point.tangent)) - x
+        return replace(point, x=x, tangent=tangent, mesh=self.mesh, solver=self)
 
     def point(
         self,

@@ -29,7 +29,6 @@ import numpy as np
 import scipy.linalg
 from numpy.polynomial import Polynomial
 
-from rodfem.stability.reduced_stiffness import negative
 from rodfem.stability.spectrum import FINITE
 from rodfem.tolerances import TINY
 
@@ -41,6 +40,11 @@ SAFE = 20.0
 """Times the fourth derivative at one place that bounds it in a piece, and what the cubic is off against rates."""
 PLACES = np.linspace(0.02, 0.98, 49)
 """Where other eigenvalues are compared with zero, in pieces."""
+
+
+def negative(H: np.ndarray) -> int:
+    """Number of negative eigenvalues of a symmetric matrix."""
+    return int((np.linalg.eigvalsh(H) < 0).sum())
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf
+from typing import TYPE_CHECKING
 
 from petsc4py import PETSc
 
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import NewtonResult, linear_step, relax
-from rodfem.fem.system import System
 from rodfem.stability.near_zero import decide
 from rodfem.stability.symmetric import SymmetricSolver
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch_solver import BranchSolver
+    from rodfem.fem.system import System
 
 STILL = 1e-6
 """Damping of Newton's method at a singular first state, over the lowest bending eigenvalue."""

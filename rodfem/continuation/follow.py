@@ -23,7 +23,8 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.continuation.branch import Point
-from rodfem.continuation.branch_solver import ALIGNED, ROWS, BranchSolver, Step, lagrange, predict
+from rodfem.continuation.branch_solver import BranchSolver, Step
+from rodfem.continuation.curves import ALIGNED, ROWS, lagrange, predict
 from rodfem.errors import ConvergenceError, InputError, many
 from rodfem.fem.newton import VIOLATED, violation
 from rodfem.fem.system import System

@@ -18,6 +18,7 @@ less well.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
@@ -31,9 +32,12 @@ from rodfem.continuation.branch import (
     NormalForm,
     SpecialPoint,
 )
-from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.curves import VERTICAL
 from rodfem.fem.newton import correct
 from rodfem.tolerances import NEGLIGIBLE, round_off
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch_solver import BranchSolver
 
 AMPLITUDES = 0.12 * np.cos(np.pi * (np.arange(4) + 0.5) / 8)
 """Amplitudes, in the metric, at which the branch is solved on both sides: half of eight Chebyshev nodes."""

@@ -46,11 +46,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE, Correction, Limits, newton
 from rodfem.fem.state import Line
@@ -59,6 +59,9 @@ from rodfem.linalg.orthogonal import combine, orthonormalize
 from rodfem.stability.inertia import Factored
 from rodfem.stability.reduced_stiffness import DIFFERENCE, Bordered, bordered_of
 from rodfem.tolerances import TINY
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch_solver import BranchSolver
 
 FREE = 1e-8
 """Part of the equations, relative to the largest, below which they do not determine an unknown."""

@@ -19,12 +19,12 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import PITCHFORK, TRANSCRITICAL, VERTICAL_BRANCH, Point, SpecialPoint
-from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import VERTICAL, zero_between
 from rodfem.continuation.first_equilibrium import STILL
 from rodfem.continuation.singular_points import LEVEL
 from rodfem.fem.newton import TOLERANCE, Correction, Limits, correct, linear_step, newton
 from rodfem.linalg.orthogonal import combine, project_out
-from rodfem.roots import zero_between
 from rodfem.tolerances import TINY
 
 NEAREST, FIRST = 1e-3, 0.05

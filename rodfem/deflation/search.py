@@ -32,7 +32,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.adaptivity.mesh_sequence import interpolated
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point
 from rodfem.continuation.branch_solver import BranchSolver
@@ -261,7 +260,7 @@ def equilibria_at(solver: BranchSolver, branches: Sequence[Branch], load: float)
     """Equilibria of traced branches at exactly ``load``, each once, which a search for further ones deflates."""
     found, known = list[Point](), Orbits(solver.system)
     for branch in branches:
-        for point in _equilibria(solver, branch, [interpolated(p, solver) for p in branch.points], load):
+        for point in _equilibria(solver, branch, [*map(solver.interpolated, branch.points)], load):
             if known.distance(point.x) >= APART:
                 point.branch = branch.name
                 found.append(point)

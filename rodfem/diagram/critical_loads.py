@@ -32,12 +32,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import zero_between
 from rodfem.continuation.eigenvalue_curves import SHARP, assignment
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.diagram.collisions import Critical, Mean, Measuring, Side, cluster_at, interpolated_zero, located_flutter
 from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
-from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured, measure
 from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricSolver, groups
 from rodfem.stability.spectrum import Spectrum, inside, times

@@ -10,7 +10,8 @@ from functools import cache
 from math import isfinite, nan
 
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
-from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import VERTICAL
 from rodfem.continuation.kinds import END
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import many

@@ -11,19 +11,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import copysign, inf
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import FIRST_BRANCH, Point
-from rodfem.continuation.branch_solver import ROWS, BranchSolver, across_orbit, predict_at_load
+from rodfem.continuation.curves import ROWS, across_orbit, predict_at_load
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
-from rodfem.fem.system import System
 from rodfem.stability.dependence import may_depend, require_independent_constraints
+
+if TYPE_CHECKING:
+    from rodfem.continuation.branch_solver import BranchSolver
 
 BENT = 1e-6
 """Distance from the chord, over the rod's length, and rotation from the scene's start, in radian, that are none."""
@@ -93,7 +96,7 @@ def check_start(solver: BranchSolver, span: tuple[float, float]) -> str:
             break
         check_index(solver, load, index)
         if 8 * index > nodes:
-            there = _index(BranchSolver(System(system.scene, mesh.finer(2), system.comm)), load)
+            there = _index(solver.on_mesh(mesh.finer(2)), load)
             if there not in (None, index):
                 return (
                     f"At {system.scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} "

@@ -18,10 +18,10 @@ from math import inf
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.mesh_sequence import interpolated
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
-from rodfem.continuation.branch_solver import VERTICAL, BranchSolver
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import VERTICAL
 from rodfem.deflation.symmetries import candidates, mirrors
 from rodfem.diagram.events import Step
 from rodfem.errors import ConvergenceError
@@ -135,7 +135,7 @@ def loop_end(branch: Branch, step: Step, width: float, alike: Alike) -> Point | 
         return None
     solver, a, b = step.solver, step.a, step.b
     if max(abs(a.slope), abs(b.slope)) < VERTICAL * width:  # equal loads: compare the states
-        first = interpolated(branch.points[0], solver)
+        first = solver.interpolated(branch.points[0])
         passed = solver.system.distance(b.x, first.x) < b.arclength - a.arclength
         return b if passed else None
     first = branch.points[0 if branch.parent is None else 1]

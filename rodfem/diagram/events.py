@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rodfem.continuation.arc import Arc, End, SoughtPiece, end, piece_with
 from rodfem.continuation.branch import Point, SpecialPoint
-from rodfem.continuation.branch_solver import BranchSolver, interpolant
+from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.curves import interpolant
 from rodfem.continuation.kinds import USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import SMALLER_STEPS, ConvergenceError

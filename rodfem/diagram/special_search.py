@@ -12,12 +12,11 @@ from dataclasses import replace
 from functools import cache
 from itertools import chain
 from math import inf
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.adaptivity.mesh_sequence import Meshes, interpolated
 from rodfem.continuation.arc import Piece
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
@@ -39,6 +38,9 @@ from rodfem.fem.newton import correct
 from rodfem.linalg.orthogonal import orthonormalize
 from rodfem.stability.dependence import taut_where_it_turns
 from rodfem.stability.reduced_stiffness import ROTATED, Condensation, ReducedStiffness
+
+if TYPE_CHECKING:
+    from rodfem.adaptivity.mesh_sequence import Meshes
 
 DIP = 0.1  # eigenvalue, over the lowest bending one, that an imperfect branch point leaves of a zero, at most
 RISE = 1e-3  # part of an eigenvalue by which rows on both sides exceed a least one
@@ -105,7 +107,7 @@ class SpecialSearch:
 
     def _from_gap(self, point: Point, solver: BranchSolver) -> float:
         """Distance of a point from the nearest gap."""
-        known = (interpolated(gap.point, solver).x for gap in self.gaps)
+        known = (solver.interpolated(gap.point).x for gap in self.gaps)
         return min((solver.system.distance(point.x, x) for x in known), default=inf)
 
     def _shorten(self, a: Point, b: Point) -> None:
@@ -119,7 +121,7 @@ class SpecialSearch:
         """Special points that the row ``b`` shows, in order; a singular row, of no index, waits for the next one."""
         settled = self._open[0]
         if settled.mesh != b.mesh:
-            self._open = [interpolated(settled, self.meshes.solvers[b.mesh])]
+            self._open = [self.meshes.solvers[b.mesh].interpolated(settled)]
         try:
             self._open.append(b)
             self._prepare(self._open[0])

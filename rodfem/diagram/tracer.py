@@ -8,7 +8,7 @@ from math import isnan
 from typing import NoReturn
 
 from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible, located
-from rodfem.adaptivity.mesh_sequence import AccuracyControl, Meshes, TooCoarse, interpolated
+from rodfem.adaptivity.mesh_sequence import AccuracyControl, Meshes, TooCoarse
 from rodfem.adaptivity.soft_states import SoftRows
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint, merge_doubles, persistent_zeros
@@ -221,7 +221,7 @@ class Tracer:
         if out is None:
             return
         last = max((p for p in branch.points if p.arclength < out.point.arclength), key=lambda p: p.arclength)
-        a = interpolated(last, self.solver)
+        a = self.solver.interpolated(last)
         begins = len(branch.points) == 1  # else what is at its first point has been found
         step = Step(self.solver, a, b, specials, begins=begins).up_to((self.low, self.high))
         branch.cut(a.arclength)
@@ -238,7 +238,7 @@ class Tracer:
     def _first_specials(self, branch: Branch) -> None:
         """Insert special points between the branch point that a branch leaves and its first point."""
         if len(branch.points) == 2 and branch.parent is not None:
-            a, b = (interpolated(point, self.solver) for point in branch.points)
+            a, b = map(self.solver.interpolated, branch.points)
             self._insert(branch, self._requests(Step(self.solver, a, b, begins=a is branch.points[0])))
 
     def _rest(self, branch: Branch) -> None:
@@ -312,7 +312,7 @@ class Tracer:
                 raise ConvergenceError(f"there is no equilibrium at {self.scene.load} = {load:g}")
             s = last.arclength + self.solver.system.distance(last.x, x)
             further = self.solver.point(x, s, self.solver.load_tangent(x, load > last.load), outcome)
-            found = self.specials.overshoot(interpolated(previous, self.solver), further)
+            found = self.specials.overshoot(self.solver.interpolated(previous), further)
         width = 1e-6 * (self.high - self.low)  # nearer is the last state
         for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
             if not any(s.point is last for s in branch.special):  # else a load asked for, which stays

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import ufl
@@ -34,13 +34,15 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.expressions import Variable, differentiated, extract_coefficients, extract_type
 from rodfem.fem.assembly import Assembler, Cells, Places
-from rodfem.fem.equations import Equations
 from rodfem.fem.state import NodalValues, State
-from rodfem.fem.system import System
 from rodfem.forms.kinematics import curvature
 from rodfem.linalg.matrices import EPS
 from rodfem.problem.functions import derived
 from rodfem.tolerances import TINY
+
+if TYPE_CHECKING:
+    from rodfem.fem.equations import Equations
+    from rodfem.fem.system import System
 
 GRID = 25
 """Places of an element, at equal distances, at which a material that varies along it is looked at as well."""

@@ -26,9 +26,9 @@ from rodfem.fem.state import LOAD
 from rodfem.linalg.chain import Chain, Factors
 from rodfem.linalg.factorization import Mumps, Sizes
 from rodfem.problem.arguments import convert, optional, reals, whole
-from rodfem.problem.contribution import Block, Group, Unknown
 from rodfem.problem.functions import Constants
 from rodfem.problem.units import Units
+from rodfem.problem.unknowns import Block, Group, Unknown
 from rodfem.tolerances import SAME_PLACE, same_place
 
 if TYPE_CHECKING:

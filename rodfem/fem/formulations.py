@@ -11,9 +11,9 @@ import ufl
 from rodfem.errors import InputError
 from rodfem.forms import lagrangian
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
-from rodfem.problem.contribution import UNIT, Block, Group, Motion, Unknown
 from rodfem.problem.functions import LETTERS, PLACES, needs_centreline
 from rodfem.problem.quaternions import of_vector, product
+from rodfem.problem.unknowns import UNIT, Block, Group, Motion, Unknown
 
 if TYPE_CHECKING:
     from rodfem.fem.equations import Equations

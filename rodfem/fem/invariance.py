@@ -28,9 +28,9 @@ from rodfem.errors import SceneError
 from rodfem.fem.assembly import Assembler
 from rodfem.fem.state import LOAD, NodalValues
 from rodfem.fem.symmetries import Symmetry, derivative, elementary_generators
-from rodfem.problem.contribution import Block, Motion
 from rodfem.problem.functions import derived
 from rodfem.problem.quaternions import directors, of_vector, product
+from rodfem.problem.unknowns import Block, Motion
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:

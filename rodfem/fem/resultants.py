@@ -22,7 +22,7 @@ force, to which that of the surface is added; what the surface does to an end of
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -30,12 +30,14 @@ from numpy.polynomial import legendre
 from petsc4py import PETSc
 
 from rodfem.fem.checks import Pieces
-from rodfem.fem.shape import Shape
 from rodfem.fem.state import NodalValues
 from rodfem.problem.contribution import Constraint
 from rodfem.problem.functions import LETTERS, derived
 from rodfem.problem.quaternions import directors, product
 from rodfem.tolerances import SAME_PLACE
+
+if TYPE_CHECKING:
+    from rodfem.fem.shape import Shape
 
 NAMES = ("strain", "curvature", "force", "moment")
 """Of the fields, as files have them."""

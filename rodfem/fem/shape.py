@@ -286,11 +286,6 @@ def richer(system: System) -> Discretization:
     return halves.finer(2, richer=int(d.degree < HIGHEST))
 
 
-def richer_system(system: System) -> System:
-    """Return the system of the same rod that is :func:`richer`."""
-    return System(system.scene, richer(system), system.comm, system.clock, symmetries=system.symmetries)
-
-
 def compile_richer(system: System) -> None:
     """Begin to compile the forms of that in the background."""
     Equations.compile_ahead(Fields(system.scene, richer(system), system.comm))

@@ -18,11 +18,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
-from rodfem.fem.assembly import Assembler, Places
 from rodfem.linalg.matrices import shared
 from rodfem.problem.functions import Constants
 
 if TYPE_CHECKING:
+    from rodfem.fem.assembly import Assembler, Places
     from rodfem.fem.equations import Equations
     from rodfem.fem.system import System
     from rodfem.problem.scene import Scene

@@ -36,7 +36,7 @@ from petsc4py import PETSc
 from rodfem.fem.state import LOAD, NodalValues
 from rodfem.forms.symmetry import AXES, Matrix, cross, left, right
 from rodfem.linalg.matrices import times
-from rodfem.problem.contribution import Motion
+from rodfem.problem.unknowns import Motion
 
 if TYPE_CHECKING:
     from rodfem.fem.fields import Fields

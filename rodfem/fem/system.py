@@ -127,6 +127,10 @@ class System:
         along = find_motion_along(equations)
         return found if along is None else [*found, along]
 
+    def on_mesh(self, mesh: Discretization) -> System:
+        """The same rod on another ``mesh``, which does not look for symmetries again."""
+        return System(self.scene, mesh, self.comm, self.clock, symmetries=self.symmetries)
+
     # --- vectors -----------------------------------------------------------------------------------------------
 
     def new_vector(self, own: np.ndarray | Sequence[float] = ()) -> PETSc.Vec:

@@ -30,19 +30,14 @@ from rodfem.problem.contribution import (
     FOLLOWER_MOMENT,
     MOMENT,
     POTENTIAL,
-    UNIT,
-    Block,
     Contribution,
-    Direction,
-    Group,
     Load,
-    Motion,
     Site,
-    Unknown,
 )
 from rodfem.problem.functions import LETTERS, Constants, Given, OfPlace, Place, Quaternion, Role, role_field
 from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import AXIS, HELD, TURNS
+from rodfem.problem.unknowns import UNIT, Block, Direction, Group, Motion, Unknown
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ import numpy as np
 import ufl
 
 from rodfem.errors import SceneError
-from rodfem.expressions import differentiated, evaluated
+from rodfem.expressions import differentiated, evaluated, parts
 from rodfem.forms.kinematics import RODS, UNDEFORMED, strain
 from rodfem.problem.arguments import Check, a, convert, encodes, finite, interval, optional, plain, real, text
 from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution, acting
@@ -37,8 +37,8 @@ from rodfem.problem.functions import (
     role_field,
     watched,
 )
-from rodfem.problem.table import Table, tables_of
-from rodfem.problem.trials import check_function, symbols
+from rodfem.problem.table import Entry, Table
+from rodfem.problem.trials import check_function, expressions_of, symbols
 from rodfem.problem.units import Units, units_of
 from rodfem.problem.validation import check_scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
@@ -63,9 +63,8 @@ class Parameter:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        word = text("P")
-        convert(self, value=real(1.0), admissible=interval(0.0, inf, real))
-        convert(self, label=word, words=word, unit=word)
+        words = dict.fromkeys(("label", "words", "unit"), text("P"))
+        convert(self, value=real(1.0), admissible=interval(0.0, inf, real), **words)
 
     def check(self, name: str, value: float) -> None:
         """Raise :class:`SceneError` unless ``value`` is a finite number inside the admissible interval."""
@@ -430,8 +429,13 @@ class Scene(Contribution, metaclass=Stated):
 
     @cached_property
     def tables(self) -> list[tuple[Table, str]]:
-        """Tables among its functions, each with the constant that it is called with."""
-        return tables_of(self)
+        """Tables that its functions call, each with the name of what it is called with, as ``s``."""
+        entries = (part for e in expressions_of(self) for part in parts(e) if isinstance(part, Entry))
+        calls = dict.fromkeys((e.table, e.ufl_operands[0].name.removeprefix("c.")) for e in entries)
+        for table, name in calls:
+            value = vars(self.constants())[name]
+            table.check(name, self.interval if name == "s" else self.span if name == self.load else (value, value))
+        return list(calls)
 
     @property
     def normal(self) -> int | None:

@@ -39,8 +39,7 @@ def supports_of(scene: Scene, sample: Sample, first: dict[str, Support] | None =
     places: dict[str, tuple[float, End, Any]] = {f"{side} end": (s, e, None) for side, s, e in sides if not e.closed}
     for i, x in enumerate(scene.attachments, start=1):
         places[f"attachment {i}"] = x.s, End(force=x.force, follower=x.follower, energy=x.energy), x.mass
-    known: dict[str, Support | None] = {**(first or dict.fromkeys(places))}
-    return {name: _support(scene, sample, place, known[name]) for name, place in places.items()}
+    return {name: _support(scene, sample, place, (first or {}).get(name)) for name, place in places.items()}
 
 
 def _support(scene: Scene, sample: Sample, where: tuple[float, End, Any], first: Support | None) -> Support:

@@ -6,19 +6,15 @@ value; :mod:`rodfem.fem.known` says what the compiled forms read there.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import ufl
 
 from rodfem.errors import SceneError
-from rodfem.expressions import Expr, Indexed, Label, Sum, Variable, parts
+from rodfem.expressions import Expr, Indexed, Label, Sum, Symbol, Variable, parts
 from rodfem.problem.functions import UnnamedError
-from rodfem.problem.trials import Symbol, expressions_of
 from rodfem.tolerances import NEGLIGIBLE
-
-if TYPE_CHECKING:
-    from rodfem.problem.scene import Scene
 
 
 class Table:
@@ -48,6 +44,13 @@ class Table:
         bent = abs(np.diff(slopes, axis=0)).max(axis=1) > NEGLIGIBLE * abs(slopes).max()
         self.corners: list[float] = [] if smooth else self.knots[1:-1][bent].tolist()
         self._labels = [Label() for _ in slopes[0]]
+
+    def check(self, name: str, needed: tuple[float, float]) -> None:
+        """Raise :class:`SceneError` unless it has rows where it is ``needed``, called with the constant ``name``."""
+        low, high, margin = *sorted(needed), NEGLIGIBLE * np.ptp(self.knots)
+        if low < self.knots[0] - margin or high > self.knots[-1] + margin:
+            has = f"has rows from {name} = {self.knots[0]:g} to {self.knots[-1]:g}"
+            raise SceneError(f"The {self.what} {has}, but is needed from {low:g} to {high:g}: give rows for that.")
 
     def adjusted(self, rows: np.ndarray) -> np.ndarray:
         """The rows as they are interpolated."""
@@ -94,20 +97,6 @@ class Entry(Variable):  # type: ignore[misc]
         """Value where the expression is a number."""
         at = float(self.ufl_operands[0].evaluate(*arguments, **options))
         return float(self.table.at(np.array([at]))[0, self.number])
-
-
-def tables_of(scene: Scene) -> list[tuple[Table, str]]:
-    """Tables that the functions of a ``scene`` call, each with the name of what they call it with, as ``s``."""
-    entries = (part for e in expressions_of(scene) for part in parts(e) if isinstance(part, Entry))
-    calls = dict.fromkeys((e.table, e.ufl_operands[0].name.removeprefix("c.")) for e in entries)
-    for table, name in calls:
-        value = vars(scene.constants())[name]
-        needed = scene.interval if name == "s" else scene.span if name == scene.load else (value, value)
-        low, high, margin = *sorted(needed), NEGLIGIBLE * np.ptp(table.knots)
-        if low < table.knots[0] - margin or high > table.knots[-1] + margin:
-            has = f"has rows from {name} = {table.knots[0]:g} to {table.knots[-1]:g}"
-            raise SceneError(f"The {table.what} {has}, but is needed from {low:g} to {high:g}: give rows for that.")
-    return list(calls)
 
 
 def tabulated(s: Any, values: Any, order: int = 1) -> Table:

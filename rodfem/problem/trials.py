@@ -20,7 +20,7 @@ import numpy as np
 import ufl
 
 from rodfem.errors import SceneError
-from rodfem.expressions import Variable, differentiated, evaluated
+from rodfem.expressions import Symbol, differentiated, evaluated
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.arguments import check_scalar, check_vector, number_of, plain, takes
 from rodfem.problem.functions import (
@@ -46,29 +46,6 @@ OF_PLACES = ("f(x, c)", "of(x, c)", "W(v, k, c)")  # calls of functions of a pla
 SAME = 1e-9  # difference of two values of a function, over the larger one, below which they are equal
 ASIDE = 1e-3
 """Displacement over length, strain or rotation out of the plane, to either side, at which energies are tried."""
-
-
-class Symbol(Variable):  # type: ignore[misc]
-    """An expression that stands for no number until it has a ``value``: ``math.cos`` refuses it."""
-
-    __slots__ = ("name", "value")
-
-    @classmethod
-    def named(cls, name: str, value: float | None = None) -> Symbol:
-        """Return what a person's function knows by this ``name``."""
-        symbol = cls(ufl.as_ufl(0.0))
-        symbol.name, symbol.value = name, value
-        return symbol
-
-    def evaluate(self, *_: Any, **__: Any) -> float:
-        """Return the value; raises :class:`TypeError` if there is none."""
-        if self.value is None:
-            raise TypeError("a constant is an expression of UFL")
-        return float(self.value)
-
-    def __repr__(self) -> str:
-        """Name, as a dictionary has it in its words on a key that it lacks."""
-        return self.name
 
 
 def symbols(scene: Scene, names: Container[str] | None = None) -> Constants:

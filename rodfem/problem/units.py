@@ -16,8 +16,8 @@ from rodfem.errors import SceneError
 from rodfem.problem.functions import STATES, some_places
 
 if TYPE_CHECKING:
-    from rodfem.problem.contribution import Block, Unknown
     from rodfem.problem.scene import Scene
+    from rodfem.problem.unknowns import Block, Unknown
 
 
 class Units(NamedTuple):

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpi4py import MPI
@@ -23,13 +23,15 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import compiled_newton
-from rodfem.fem.state import State
-from rodfem.fem.symmetries import Phase
-from rodfem.fem.system import System
 from rodfem.linalg.chain import Factors
 from rodfem.linalg.matrices import EPS, local_rows, places_in, rounding, shared, times
 from rodfem.linalg.orthogonal import generic
 from rodfem.tolerances import TINY
+
+if TYPE_CHECKING:
+    from rodfem.fem.state import State
+    from rodfem.fem.symmetries import Phase
+    from rodfem.fem.system import System
 
 NOISE = 8.0
 """Largest observed ratio of the round-off in an eigenvalue to the effect of random errors of the matrix's entries."""

@@ -13,15 +13,18 @@ other vector is named as a mode of vibration.  Symmetries of the state are no pa
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from petsc4py import PETSc
 
-from rodfem.fem.state import State
 from rodfem.fem.symmetries import Generators, Symmetry, elementary_generators, rigid_motions, summed
-from rodfem.fem.system import System
 from rodfem.problem.functions import derived
 from rodfem.tolerances import TINY
+
+if TYPE_CHECKING:
+    from rodfem.fem.state import State
+    from rodfem.fem.system import System
 
 SHARE = 0.9
 """Share of a vector in the span of a group above which it is named after it."""

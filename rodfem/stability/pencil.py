@@ -8,18 +8,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError, SceneError
-from rodfem.fem.state import State
-from rodfem.fem.system import System
 from rodfem.linalg.matrices import gathered
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.validation import trouble_with_inertia
 from rodfem.tolerances import NEGLIGIBLE
+
+if TYPE_CHECKING:
+    from rodfem.fem.state import State
+    from rodfem.fem.system import System
 
 
 class PencilMatrices:

@@ -125,11 +125,6 @@ class ReducedStiffness:
     zero: int  # number of eigenvalues that are zero to working accuracy
 
 
-def negative(H: np.ndarray) -> int:
-    """Number of negative eigenvalues of a symmetric matrix."""
-    return int((np.linalg.eigvalsh(H) < 0).sum())
-
-
 class Condensation:
     """Reduced stiffness matrices of states on one mesh, by the saddle matrix of an ``inertia``."""
 

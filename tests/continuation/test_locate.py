@@ -8,8 +8,8 @@ import pytest
 from numpy.polynomial import chebyshev
 from numpy.polynomial.polynomial import polyfromroots
 
+from rodfem.continuation.curves import zero_between
 from rodfem.continuation.eigenvalue_curves import in_doubt, locate_flutter, real_root
-from rodfem.roots import zero_between
 from rodfem.stability.cluster import Cluster, Measured
 
 NODES = 6

@@ -12,9 +12,9 @@ from rows import regular
 import rodfem
 from rodfem import Discretization, Solver, pinned
 from rodfem.continuation.arc import Piece
-from rodfem.continuation.crossings import Node, Zeros, fourth, roots
+from rodfem.continuation.crossings import Node, Zeros, fourth, negative, roots
 from rodfem.linalg.matrices import gathered
-from rodfem.stability.reduced_stiffness import Condensation, negative
+from rodfem.stability.reduced_stiffness import Condensation
 
 
 @pytest.mark.parametrize("load", [20.0, None])
