@@ -13,9 +13,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from petsc4py import PETSc
 
 from rodfem.codim2.adjoint import state_derivative
 from rodfem.codim2.criteria import restoration
@@ -32,9 +33,6 @@ from rodfem.problem.arguments import Check, checked, each
 from rodfem.problem.field import Field, names, with_fields
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
-
-if TYPE_CHECKING:
-    from petsc4py import PETSc
 
 CRITICAL, ORDINATE, SHAPE = "critical loads", "ordinate", "shape"
 """What may be measured: see :func:`identify`."""

@@ -343,23 +343,23 @@ class Collision(Criterion):
         super().__init__(solver, plane)
         self.eigensolver = NonsymmetricSolver(solver.system)
 
-    def value(self, here: Measured) -> float:
+    def _value(self, here: Measured) -> float:
         """What vanishes on the curve, of a cluster at a state."""
         return here.discriminant
 
-    def sharp(self, noise: ClusterNoise) -> tuple[float, float]:
+    def _sharp(self, noise: ClusterNoise) -> tuple[float, float]:
         """The same by both subspaces, and its round-off."""
         return noise.two_sided, noise.discriminant
 
-    def split(self, here: Measured) -> tuple[float, float]:
+    def _split(self, here: Measured) -> tuple[float, float]:
         """By how much it may differ among pairs that are taken for one, and what is large."""
         return here.split, max(here.cluster.mean**2, self.solver.units.omega2**2)
 
-    def squared(self, here: Measured) -> float:
+    def _squared(self, here: Measured) -> float:
         """Square of the frequency."""
         return here.cluster.mean
 
-    def mean(self, near: LocusPoint) -> float:
+    def _mean(self, near: LocusPoint) -> float:
         """Mean of the eigenvalues of the cluster at a point."""
         return near.omega2
 
@@ -374,13 +374,13 @@ class Collision(Criterion):
         forward = guess[2] / plane.width / np.linalg.norm(guess[2] / plane.width)
         across = np.array([-forward[1], forward[0]]) * plane.width
         system.line = plane.line(guess[0], across)
-        t, last, here, x = self._collide(guess[1], Cluster(basis, self.mean(near)), reach)
-        p, omega2 = guess[0] + t * across, self.squared(here)
+        t, last, here, x = self._collide(guess[1], Cluster(basis, self._mean(near)), reach)
+        p, omega2 = guess[0] + t * across, self._squared(here)
         slopes, around = zip(*(self._slope(which, p, x, here) for which in range(2)), strict=True)
         gradient, clearest = np.array(slopes), max((here, *chain(*around)), key=lambda m: m.spread)
         if not np.linalg.norm(gradient):
             raise ConvergenceError("what vanishes on the curve is constant")
-        split, large = self.split(here)
+        split, large = self._split(here)
         if split > FEWER * large:
             raise Destroyed(f"its {here.cluster.size // 2} pairs of eigenvalues do not meet together any more")
         dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
@@ -416,14 +416,14 @@ class Collision(Criterion):
             self._measured(side * place * step, x, Cluster(here.cluster.basis, here.cluster.mean))[0]
             for place, _ in stencil
         ]
-        parts = [weight * self.value(found) for found, (_, weight) in zip(around, stencil, strict=True)]
+        parts = [weight * self._value(found) for found, (_, weight) in zip(around, stencil, strict=True)]
         return side * sum(parts) / step, around
 
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
         """Zero on the system's line of parameters: by secants, the last digits by both subspaces."""
         t, other, before = 0.0, FIRST, np.inf
         now, x = self._measured(t, x, cluster)
-        here, at_other = self.value(now), self.value(self._measured(other, x, cluster)[0])
+        here, at_other = self._value(now), self._value(self._measured(other, x, cluster)[0])
         slope = (at_other - here) / (other - t)
         for _ in range(12):
             if here == at_other:
@@ -438,7 +438,7 @@ class Collision(Criterion):
             if abs(t) > reach:
                 break
             now, x = self._measured(t, x, Cluster(cluster.basis, now.cluster.mean))
-            here = self.value(now)
+            here = self._value(now)
         raise ConvergenceError("two eigenvalues do not collide near by")
 
     def _by_both_sides(self, found: Zero, slope: float) -> Zero:
@@ -446,7 +446,7 @@ class Collision(Criterion):
         t, _, now, x = found
         with suppress(ConvergenceError):
             for _ in range(2):
-                here, noise = self.sharp(noise_of(self.eigensolver.at(x), now))
+                here, noise = self._sharp(noise_of(self.eigensolver.at(x), now))
                 step = -here / slope
                 t += step
                 now, x = self._measured(t, x, now.cluster)
@@ -464,25 +464,20 @@ class Collision(Criterion):
 class Oscillation(Collision):
     """Corrects points of the plane to where two conjugate rates of a rod with drag have no real part."""
 
-    def value(self, here: Measured) -> float:
-        """See :class:`Collision`."""
+    def _value(self, here: Measured) -> float:
         return here.cluster.mean
 
-    def sharp(self, noise: ClusterNoise) -> tuple[float, float]:
-        """See :class:`Collision`."""
+    def _sharp(self, noise: ClusterNoise) -> tuple[float, float]:
         return noise.two_sided_mean, noise.mean
 
-    def split(self, here: Measured) -> tuple[float, float]:
-        """See :class:`Collision`."""
+    def _split(self, here: Measured) -> tuple[float, float]:
         apart = float(abs(here.values.real - here.cluster.mean).max())
         return apart, max(here.frequency, self.solver.units.omega2)
 
-    def squared(self, here: Measured) -> float:
-        """See :class:`Collision`; negative of two real rates of opposite sign."""
-        return -here.discriminant
+    def _squared(self, here: Measured) -> float:
+        return -here.discriminant  # negative of two real rates of opposite sign
 
-    def mean(self, near: LocusPoint) -> float:
-        """See :class:`Collision`."""
+    def _mean(self, near: LocusPoint) -> float:
         return 0.0
 
 

@@ -13,16 +13,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import copysign
 from sys import float_info
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.continuation.branch import Point
+from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
-
-if TYPE_CHECKING:
-    from rodfem.continuation.branch import Point
-    from rodfem.fem.system import System
 
 VERTICAL = 1e-8
 """Slope of the load (in spans per unit of arclength) below which it counts as constant along a branch."""

@@ -13,20 +13,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rodfem.continuation.arc import Arc, End, SoughtPiece, end, piece_with
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
+from rodfem.continuation.crossings import Node
 from rodfem.continuation.curves import interpolant
 from rodfem.continuation.kinds import USER
 from rodfem.continuation.observer import Observer, Remark
 from rodfem.errors import SMALLER_STEPS, ConvergenceError
 from rodfem.problem.events import Event, Level
 from rodfem.tolerances import round_off
-
-if TYPE_CHECKING:
-    from rodfem.continuation.crossings import Node
 
 
 class Step(NamedTuple):

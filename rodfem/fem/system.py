@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -41,11 +40,9 @@ from rodfem.fem.symmetries import (
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
 from rodfem.problem.functions import derived, floats
+from rodfem.problem.scene import Scene
 from rodfem.problem.units import own_units
 from rodfem.timing import Clock
-
-if TYPE_CHECKING:
-    from rodfem.problem.scene import Scene
 
 
 class System:
