@@ -118,20 +118,16 @@ def _header(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     names = {"ordinate": data["ordinate"], **DERIVED}
     labels = names | {"ordinate": ordinate_in_words(data)}
     return {
-        "scene": data["scene"],
+        **{name: data[name] for name in ("scene", "parameter", "constants", "natural", "meaning")},
         "title": plain_of(data["title"]),
-        "parameter": data["parameter"],
         "symbol": plain_of(data["parameter_label"], always=True),
         "label": label_of(words, data["parameter_label"], units["load"]),
         "ordinates": [
             {"key": key, "name": names.get(key, key), "label": html_of(labels.get(key, key))}
             for key in ordinates_of(data)
         ],
-        "constants": data["constants"],
-        "natural": data["natural"],
         "units": units,
         "complete": data.get("complete", True),
-        "meaning": data["meaning"],
         "mesh": mesh_in_words(data["discretization"]),
         "program": data["format"]["program"],
         "origin": _origin(data.get("origin") or {}),
