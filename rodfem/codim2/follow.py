@@ -240,15 +240,9 @@ class RicherMesh:
 
 
 def locus(
-    solver: BranchSolver,
-    special: SpecialPoint,
-    parameter: str,
-    bounds: tuple[Interval, Interval],
-    steps: StepControl = STEPS,
-    error_bars: int = 5,
-    *,
-    doubtful: bool = False,
-) -> Locus:
+    solver: BranchSolver, special: SpecialPoint, parameter: str, bounds: tuple[Interval, Interval],
+    steps: StepControl = STEPS, error_bars: int = 5, *, doubtful: bool = False,
+) -> Locus:  # fmt: skip
     """Follow a ``special`` point in the plane of the scene's load and a second ``parameter``, to both sides.
 
     On ``bounds``, their intervals, the curve ends exactly; lengths of ``steps`` are relative to them.  Errors are

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -72,9 +72,8 @@ def draw_shape(
     plotter = pyvista.Plotter(off_screen=True, window_size=list(size), lighting="light kit")
     plotter.set_background("white")
     solids = state.solids(look)
-    for solid in (*solids, *state.arrows(look.radius)):
-        surface = pyvista.PolyData.from_regular_faces(solid.points, solid.triangles)
-        plotter.add_mesh(surface, color=solid.color, split_sharp_edges=True, feature_angle=40.0, **SHINE)
+    for color, surface in _surfaces(pyvista.PolyData, [*solids, *state.arrows(look.radius)]):
+        plotter.add_mesh(surface, color=color, split_sharp_edges=True, feature_angle=40.0, **SHINE)
     _look_at(plotter, np.concatenate([solid.points for solid in solids]), look, size[0] / size[1])
     plotter.add_axes(xlabel="e1", ylabel="e2", zlabel="e3", color=DARK, x_color=DARK, y_color=DARK, z_color=DARK)
     _write(plotter, state.caption if caption is None else caption, state.setting.notes, solids)
@@ -85,6 +84,13 @@ def draw_shape(
     if np.ptp(picture) == 0:
         raise RuntimeError(f"the picture {path} came out blank: {LIBRARIES}")
     return path
+
+
+def _surfaces(kind: Any, bodies: Sequence[Solid | Glyph]) -> Iterator[tuple[str, Any]]:
+    """Each colour with all its ``bodies`` as one surface: VTK takes as long to set up an arrow as a rod."""
+    for color in dict.fromkeys(body.color for body in bodies):
+        first, *others = (kind.from_regular_faces(x.points, x.triangles) for x in bodies if x.color == color)
+        yield color, first.append_polydata(*others)
 
 
 @dataclass(frozen=True)
@@ -203,15 +209,9 @@ def thickness(centres: Floats) -> float:
 
 
 def view_of(
-    reference: Floats,
-    moved: Floats,
-    *,
-    axis: Floats | None = None,
-    down: Floats | None = None,
-    load: Floats | None = None,
-    side: Floats | None = None,
-    feet: bool = False,
-) -> Floats:
+    reference: Floats, moved: Floats, *, axis: Floats | None = None, down: Floats | None = None,
+    load: Floats | None = None, side: Floats | None = None, feet: bool = False,
+) -> Floats:  # fmt: skip
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
     The rod has ``moved`` (n, 3) from the centreline ``reference`` (n, 3).  Directions (3,) are the ``axis`` of the rod
@@ -321,12 +321,9 @@ class Snapshot:
 
 
 def snapshot(
-    branches: Sequence[Branch],
-    solvers: Sequence[BranchSolver],
-    point: Point,
-    path: Path | str | None,
+    branches: Sequence[Branch], solvers: Sequence[BranchSolver], point: Point, path: Path | str | None,
     caption: str | None,
-) -> Snapshot:
+) -> Snapshot:  # fmt: skip
     """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one."""
     from rodfem.continuation.branch import Branch
     from rodfem.output.files import states_of
@@ -351,7 +348,15 @@ def snapshot(
 
 # --- in processes
 
-PROGRAM = "import sys; from rodfem.output.render import drawn; sys.exit(drawn(*sys.argv[1:]))"
+PROGRAM = """
+import os, sys
+from rodfem.libraries import terse_matplotlib
+with terse_matplotlib():
+    from rodfem.output.render import drawn
+    words = drawn(*sys.argv[1:])
+print(words or "", file=sys.stderr, flush=True)
+os._exit(bool(words))  # to take VTK down takes a tenth of a process
+"""
 
 
 def drawn(states: str, branch: str, row: str, path: str, caption: str) -> str | None:

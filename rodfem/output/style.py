@@ -83,7 +83,8 @@ def explain(axes: Axes, handles: Sequence[Artist]) -> None:
         list(entries.values()), list(entries), loc="upper center", ncols=columns, fontsize=FONT - 2.5, **place
     )
     legend.entries = entries  # type: ignore[attr-defined]
-    axes.figure.draw_without_rendering()  # pixels are final
+    layout = axes.figure.get_layout_engine()  # after which pixels are final
+    layout.execute(axes.figure) if layout else axes.figure.draw_without_rendering()
 
 
 def save(figure: Figure, path: Path) -> Path:
