@@ -59,9 +59,9 @@ def _compile(*arguments: Any, **options: Any) -> Any:
     """Compile as FFCx does, in a folder of its own; raises :class:`SetupError` if there is no compiler."""
     require_compiler()
     given = _SIGNATURE.bind(*arguments, **options)
-    folder = Path(given.arguments["cache_dir"])
-    with TemporaryDirectory(dir=folder) as room:
-        given.arguments["cache_dir"] = Path(room)
+    with TemporaryDirectory(dir=(folder := Path(given.arguments["cache_dir"]))) as room:
+        flags = [*(given.arguments["cffi_extra_compile_args"] or ()), "-w"]  # nobody mends code that FFCx writes
+        given.arguments.update(cache_dir=Path(room), cffi_extra_compile_args=flags)
         made = _COMPILE(*given.args, **given.kwargs)
         files = (file for file in Path(room).iterdir() if file.is_file())
         for file in sorted(files, key=lambda file: file.suffix == ".cached"):  # last, as it says that all are there

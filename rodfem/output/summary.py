@@ -282,10 +282,10 @@ def _gaps(ranges: Sequence[tuple[float, float]], low: float, high: float) -> Ite
         reached = max(reached, b)
 
 
-def _coexistence(data: Data) -> Iterator[str]:
-    """Ranges of the load with several stable states."""
-    pairs = () if is_sweep(data) else combinations(_intervals(data, STABLE), 2)
-    found = [(*pair, *both) for pair in pairs if (both := _shared(*pair))]
+def _coexistence(data: Data, most: int = 100) -> Iterator[str]:
+    """Ranges of the load with several stable states, of which ``most`` are compared with each other."""
+    stable = [] if is_sweep(data) else _intervals(data, STABLE)
+    found = [(*pair, *both) for pair in combinations(stable[:most], 2) if (both := _shared(*pair))]
     for one, other, a, b in found[:MOST]:
         names = " and ".join(dict.fromkeys(called(interval.branch["name"]) for interval in (one, other)))
         states, verb = f"From {_interval(data, a, b, 'to')} two stable states", f"coexist, of {names}"
@@ -294,7 +294,7 @@ def _coexistence(data: Data) -> Iterator[str]:
         else:
             yield f"{states} may {verb}: the mesh does not resolve them, use more elements."
     if more := found[MOST:]:
-        yield f"So do {many(len(more), 'further pair')} of stable states at other loads."
+        yield f"So do {many(len(more), 'further pair')} of stable states elsewhere{', or more' * (len(stable) > most)}."
 
 
 def _shared(one: Interval, other: Interval) -> tuple[float, float] | None:

@@ -117,6 +117,24 @@ def test_unfolding_is_the_work_of_the_imperfection() -> None:
     assert values[1].size > values[1].noise
 
 
+def test_a_branch_point_that_the_mesh_unfolds_ends_no_branch() -> None:
+    """A strut on a softening foundation: branch 1, of 13 half-waves, passes a branch point at P = 1.859970217.
+
+    48 and 96 elements agree on that to 1e-9.  On 24 an equilibrium of the mesh is beside it only, by as much as its
+    unfolding parameter.
+    """
+    strut = column(
+        "strut", SUPPORTS["pinned-pinned"], (1.85, 2.05), interval=(0.0, 40.0), constants={"P": 1.85, "B2": 1.0},
+        ordinate=Ordinate("deflection", s=20.0, of=lambda r, q: r[0]), planar="e2",
+        potential=lambda x, c: 0.5 * x.r[0] ** 2 - 0.25 * x.r[0] ** 4,
+    )  # fmt: skip
+    branch = trace(strut, Discretization(elements=24), Plan(depth=1, most_branches=2))["branch 1"]
+    assert branch.ended == "end of range" and branch.points[-1].load == 1.85
+    (point,) = (s for s in branch.special if abs(s.point.load - 1.86) < 5e-3)
+    assert 1e-12 < point.unfolding < 1e-6
+    assert abs(point.point.load - 1.859970217) <= 1.5 * point.error_estimate < 2e-8
+
+
 def test_perfect_points_stay_what_they_are() -> None:
     found = diagram(cantilever(0.0))
     (special,) = found.special()

@@ -76,6 +76,16 @@ def form() -> Any:
 
 
 @pytest.mark.versions
+def test_the_compiler_warns_of_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Of an And in an Or it would: gcc suggests parentheses."""
+    domain = compat.interval_mesh(MPI.COMM_SELF, 1, 0.0, 1.0)
+    x = ufl.SpatialCoordinate(domain)[0]
+    either = ufl.Or(ufl.And(ufl.gt(x, 0.2), ufl.lt(x, 0.4)), ufl.And(ufl.gt(x, 0.6), ufl.lt(x, 0.8)))
+    jit.compile_forms([ufl.conditional(either, 2.0, 1.0) * ufl.dx(domain=domain)], cache_dir=tmp_path)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.versions
 def test_a_form_that_is_lost_is_compiled_again(tmp_path: Path) -> None:
     asked = form()
     jit.compile_forms([asked], cache_dir=tmp_path)

@@ -9,9 +9,10 @@ import classics
 import golden_cases
 import pytest
 
-from rodfem import Diagram
+import rodfem
+from rodfem import Diagram, Discretization, Plan
 from rodfem.output.summary import in_sentences
-from rodfem.output.words import special_lines
+from rodfem.output.words import special_lines, words_of
 
 
 def branch(name: str, loads: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
@@ -167,6 +168,19 @@ def test_states_that_the_mesh_does_not_resolve_may_coexist() -> None:
         assert ("hysteresis" in words) == end["resolved"]
 
 
+def test_all_who_say_whether_a_state_is_stable_agree() -> None:
+    """A planar column under P = 3: it falls out of its plane at pi^2/4 and buckles in it at pi^2/2."""
+    found = rodfem.trace(classics.planar_column(), Discretization(elements=4), Plan((0.0, 6.0), at=(3.0,), depth=0))
+    (special,) = (s for s in found[0].special if s.kind == "user")
+    point, row = special.point, special.row
+    assert pi**2 / 4 < point.load < pi**2 / 2 and (point.negative, point.negative_in_space) == (0, 1)
+    assert point.stable is found.assess(point).stable is found.at(3.0)[0].stable is False
+    for words in (repr(point), repr(found.at(3.0)[0])):
+        assert "stable in the plane, unstable in space, index 1" in words
+    assert found[0]["stable"][row] == 0.0 and words_of(found.data["branches"][0], planar=True)[row].verdict == "planar"
+    assert "stable in its plane but not in space (index 1 at most)" in found.in_words()
+
+
 def test_rows_decide_where_a_bar_is_wide() -> None:
     """A special point that the mesh does not resolve, with a bar over three rows: their indices are the mesh's."""
     point = special("fold", 1, 1.0, 1, 0, error_estimate=5.0, located_to=1e-9, resolved=False)
@@ -224,6 +238,14 @@ def test_states_that_have_one_energy_at_one_load_alone_coexist() -> None:
     )
     coexist = "From P = 0 to 2 two stable states coexist, of twist 0 and twist 2"
     assert coexist in said(ring, twisted, span=(0.0, 2.0)) and "coexist" not in said(ring, ring, span=(0.0, 2.0))
+
+
+def test_of_many_stable_branches_a_hundred_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All pairs of ten thousand, which a file may have, would take an hour."""
+    asked: list[Any] = []
+    monkeypatch.setattr("rodfem.output.summary._shared", lambda *pair: asked.append(pair))
+    said(*(branch(f"found {i}", [0.0, 2.0, 4.0], [0] * 3) for i in range(300)))
+    assert len(asked) == 100 * 99 // 2
 
 
 def test_many_branches_and_many_intervals_are_counted() -> None:
