@@ -7,8 +7,6 @@ package of rodfem that computes imports this module before anything else.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
@@ -38,17 +36,6 @@ def optional(name: str, extra: str) -> ModuleType:
 
         how = f'apt install python3-{name}, or pip install "rodfem[{extra}]"'
         raise SetupError(f"{name} is not installed: {how}.") from missing
-
-
-@contextmanager
-def terse_matplotlib() -> Iterator[None]:
-    """Load matplotlib inside the block without lists of properties in its docstrings, which take a quarter as long."""
-    artist = import_module("matplotlib.artist")
-    words, artist.kwdoc = artist.kwdoc, lambda _: ""  # type: ignore[attr-defined]
-    try:
-        yield
-    finally:
-        artist.kwdoc = words  # type: ignore[attr-defined]
 
 
 _load()

@@ -67,9 +67,14 @@ class SoftStates:
         self._richer_index: int | None = None  # of the last state, if it is another one
 
     def examine(
-        self, point: Point, *, fixed_load: bool, compare: bool = False, family: bool = False,
+        self,
+        point: Point,
+        *,
+        fixed_load: bool,
+        compare: bool = False,
+        family: bool = False,
         vanishing: Sequence[PETSc.Vec] = (),
-    ) -> bool:  # fmt: skip
+    ) -> bool:
         """Record the soft modes of a ``point``, and its index as far as they are decided; whether there are any.
 
         On a richer mesh the point is at the same load (``fixed_load``), or on the plane across the branch; ``compare``

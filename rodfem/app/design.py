@@ -73,9 +73,12 @@ class Design:
 
 @checked(scene=SCENE)
 def design(
-    scene: Scene, fields: Mapping[str, Field], maximise: str | Loads = FIRST_LOSS, subject_to: Sequence[Any] = (),
+    scene: Scene,
+    fields: Mapping[str, Field],
+    maximise: str | Loads = FIRST_LOSS,
+    subject_to: Sequence[Any] = (),
     **of_trace: Any,
-) -> Design:  # fmt: skip
+) -> Design:
     """Fields in the place of constants of a ``scene`` for which its first branch stays stable longest.
 
     ``fields`` are :class:`~rodfem.Field` by the name of the constant, as in ``{"A": Field(9, bounds=(0.1, 3.0),

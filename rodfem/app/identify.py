@@ -73,10 +73,12 @@ def _one_or_more(check: Check) -> Check:
 
 @checked(scene=_one_or_more(SCENE), discretization=MESH)
 def identify(
-    scene: Scene | Sequence[Scene], data: Mapping[str, Any] | Sequence[Mapping[str, Any]],
-    unknown: Sequence[str] | Mapping[str, Field], deviations: Mapping[str, float] | None = None,
+    scene: Scene | Sequence[Scene],
+    data: Mapping[str, Any] | Sequence[Mapping[str, Any]],
+    unknown: Sequence[str] | Mapping[str, Field],
+    deviations: Mapping[str, float] | None = None,
     discretization: Discretization | None = None,
-) -> Identified:  # fmt: skip
+) -> Identified:
     """Constants of a ``scene``, or fields in their place, for which it fits what was measured best.
 
     ``data`` has at least one of ``"critical loads"``: those at which the index of the first branch grows, in their

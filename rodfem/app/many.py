@@ -51,9 +51,12 @@ def key_of(scene: Scene) -> dict[str, Any]:
     scenes=each(SCENE), work=function("work"), folder=path("results/map"), comm=RANKS, progress=function("print", 2)
 )
 def many(
-    scenes: Sequence[Scene], work: Work, folder: Path | str, comm: MPI.Comm = MPI.COMM_WORLD,
+    scenes: Sequence[Scene],
+    work: Work,
+    folder: Path | str,
+    comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Callable[[int, int], None] = lambda done, all_of_them: None,
-) -> list[dict[str, Any]]:  # fmt: skip
+) -> list[dict[str, Any]]:
     """Return ``work(scene)`` for all scenes, in order, on every rank; rods are dealt out to the ranks in turn.
 
     Scenes that :meth:`~rodfem.Scene.varying` has made from one another share their equations: they are set up faster.
@@ -69,9 +72,12 @@ def many(
 
 
 def shared(
-    keys: Sequence[dict[str, Any]], works: Sequence[Callable[[], dict[str, Any]]], folder: Path | str,
-    comm: MPI.Comm, progress: Callable[[int, int], None],
-) -> list[dict[str, Any]]:  # fmt: skip
+    keys: Sequence[dict[str, Any]],
+    works: Sequence[Callable[[], dict[str, Any]]],
+    folder: Path | str,
+    comm: MPI.Comm,
+    progress: Callable[[int, int], None],
+) -> list[dict[str, Any]]:
     """Results of ``works``, as :func:`many` has them; a saved one is used again if it has the same key."""
     folder = Path(folder)
     end_together()
@@ -138,9 +144,13 @@ def _contents(file: Path) -> dict[str, Any]:
 
 @checked(scene=SCENE, folder=path("results/family"), plan=PLAN, discretization=MESH)
 def family(
-    scene: Scene, over: Mapping[str, Sequence[float]], folder: Path | str, plan: Plan | None = None,
-    discretization: Discretization | None = None, **sharing: Any,
-) -> Any:  # fmt: skip
+    scene: Scene,
+    over: Mapping[str, Sequence[float]],
+    folder: Path | str,
+    plan: Plan | None = None,
+    discretization: Discretization | None = None,
+    **sharing: Any,
+) -> Any:
     """Critical loads of a ``scene`` for every combination of values of constants, an ``xarray.Dataset``.
 
     ``over`` has the values by name, as in ``{"A": np.linspace(-2, 0, 41)}``: the dimensions of the dataset.  Of each

@@ -28,7 +28,6 @@ from rodfem.diagram.solver import MESH, RANKS, SCENE
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
 from rodfem.fem.system import System
-from rodfem.libraries import terse_matplotlib
 from rodfem.modes.finder import ModeFinder, typical_modes
 from rodfem.modes.modes import Modes, save_modes
 from rodfem.output.files import load_json, save_json, save_run
@@ -58,10 +57,18 @@ atexit.register(gc.freeze)  # what there is at the end goes with the process: a 
     words=function("str"),
 )
 def run(
-    scene: Scene, discretization: Discretization | None = None, plan: Plan | None = None,
-    output: Path | str | None = None, *, figures: bool = True, comm: MPI.Comm = MPI.COMM_WORLD, quiet: bool = False,
-    verbose: bool = False, words: Callable[[str], str] = str, **of_plan: Any,
-) -> Diagram:  # fmt: skip
+    scene: Scene,
+    discretization: Discretization | None = None,
+    plan: Plan | None = None,
+    output: Path | str | None = None,
+    *,
+    figures: bool = True,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    quiet: bool = False,
+    verbose: bool = False,
+    words: Callable[[str], str] = str,
+    **of_plan: Any,
+) -> Diagram:
     """Trace a scene, and write ``diagram.json``, ``states.h5`` and (on rank 0) the pictures into ``output``.
 
     Files are updated after every branch: an interrupted run keeps all completed branches, which :func:`rodfem.load`
@@ -259,10 +266,10 @@ def draw(output: Path, report: Report) -> None:
     """Draw the diagram, and at the same time in a second process the shape of a stable state if there is one."""
     from concurrent.futures import ThreadPoolExecutor
 
-    with terse_matplotlib():
-        from rodfem.output.plot_diagram import draw_diagram
-        from rodfem.output.plot_frequencies import draw_frequencies
-        from rodfem.output.render import draw_shape_safely
+    from rodfem.output.files import load_json
+    from rodfem.output.plot_diagram import draw_diagram
+    from rodfem.output.plot_frequencies import draw_frequencies
+    from rodfem.output.render import draw_shape_safely
     from rodfem.output.words import is_sweep
 
     data = load_json(output / "diagram.json")

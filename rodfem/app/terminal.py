@@ -81,9 +81,13 @@ class Report(Observer):
     """Prints on rank 0."""
 
     def __init__(
-        self, comm: MPI.Comm = MPI.COMM_WORLD, stream: TextIO | None = None, words: Callable[[str], str] = str, *,
+        self,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        stream: TextIO | None = None,
+        words: Callable[[str], str] = str,
+        *,
         verbose: bool = True,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Print what ``words`` makes of each line, if ``verbose`` of technical ones too, to ``stream`` on rank 0."""
         self.verbose = verbose
         self.count, self.words, self.units, self.wide = INDEX, words, ONES, 6

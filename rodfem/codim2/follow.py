@@ -240,9 +240,15 @@ class RicherMesh:
 
 
 def locus(
-    solver: BranchSolver, special: SpecialPoint, parameter: str, bounds: tuple[Interval, Interval],
-    steps: StepControl = STEPS, error_bars: int = 5, *, doubtful: bool = False,
-) -> Locus:  # fmt: skip
+    solver: BranchSolver,
+    special: SpecialPoint,
+    parameter: str,
+    bounds: tuple[Interval, Interval],
+    steps: StepControl = STEPS,
+    error_bars: int = 5,
+    *,
+    doubtful: bool = False,
+) -> Locus:
     """Follow a ``special`` point in the plane of the scene's load and a second ``parameter``, to both sides.
 
     On ``bounds``, their intervals, the curve ends exactly; lengths of ``steps`` are relative to them.  Errors are

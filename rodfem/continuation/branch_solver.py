@@ -259,9 +259,13 @@ class BranchSolver:
         return replace(point, x=x, tangent=tangent, mesh=self.mesh, solver=self)
 
     def point(
-        self, x: PETSc.Vec, arclength: float, tangent: PETSc.Vec | None, outcome: NewtonResult | None = None,
+        self,
+        x: PETSc.Vec,
+        arclength: float,
+        tangent: PETSc.Vec | None,
+        outcome: NewtonResult | None = None,
         index: Index | None = None,
-    ) -> Point:  # fmt: skip
+    ) -> Point:
         """Evaluate all records of the equilibrium ``x``; its index unless that is given."""
         system = self.system
         if index is None:

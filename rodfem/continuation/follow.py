@@ -102,9 +102,12 @@ class IndexStepControl(StepControl):
 
 
 def follow(
-    solver: BranchSolver, points: list[Point], steps: StepControl, bounds: tuple[float, float],
+    solver: BranchSolver,
+    points: list[Point],
+    steps: StepControl,
+    bounds: tuple[float, float],
     reach: Callable[[Point], float] = lambda point: float("inf"),
-) -> Iterator[Point | str]:  # fmt: skip
+) -> Iterator[Point | str]:
     """Continue a branch from its last point, yielding accepted points; a string at the end says why it ended.
 
     It ends exactly on the ``bounds`` of the load, and has a point exactly at each stop of the scene, where the tangent

@@ -100,9 +100,13 @@ def leave(solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, fir
 
 
 def start_branch(
-    solver: BranchSolver, special: SpecialPoint, direction: PETSc.Vec, ways: int, bounds: tuple[float, float],
+    solver: BranchSolver,
+    special: SpecialPoint,
+    direction: PETSc.Vec,
+    ways: int,
+    bounds: tuple[float, float],
     depth: int,
-) -> tuple[list[Point], int | None] | None:  # fmt: skip
+) -> tuple[list[Point], int | None] | None:
     """First two points, and first index, of the branch that leaves ``special`` along ``direction``, one of ``ways``.
 
     The first one is the special point, and the index that right after it, None where it is not known: eigenvalues that

@@ -185,9 +185,13 @@ class Diagram:
         steps=a(StepControl, "a StepControl, as in StepControl(largest=0.02)"),
     )
     def locus(
-        self, special: SpecialPoint, parameter: str, interval: tuple[float, float],
-        load: tuple[float, float] | None = None, steps: StepControl | None = None,
-    ) -> Locus:  # fmt: skip
+        self,
+        special: SpecialPoint,
+        parameter: str,
+        interval: tuple[float, float],
+        load: tuple[float, float] | None = None,
+        steps: StepControl | None = None,
+    ) -> Locus:
         """Follow a special point in the plane of the load and a second parameter.
 
         ``special`` is a fold, a branch point, a flutter load or a divergence load of this diagram, ``interval`` has the
@@ -378,9 +382,14 @@ PLAN: Check = a(Plan, "a Plan, as in Plan(at=(1.0,), depth=1)")
 
 @checked(scene=SCENE, discretization=MESH, plan=PLAN, observer=a(Observer, "a rodfem.Observer"), comm=RANKS)
 def trace(
-    scene: Scene, discretization: Discretization | None = None, plan: Plan | None = None,
-    observer: Observer | None = None, *, comm: MPI.Comm = MPI.COMM_WORLD, **of_plan: Any,
-) -> Diagram:  # fmt: skip
+    scene: Scene,
+    discretization: Discretization | None = None,
+    plan: Plan | None = None,
+    observer: Observer | None = None,
+    *,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    **of_plan: Any,
+) -> Diagram:
     """Trace the equilibria of a scene and decide the stability of each; collective over the ranks of ``comm``.
 
     Conservative scenes are followed by continuation, from branch to branch; of loads without a potential the range is

@@ -56,9 +56,14 @@ class Solver:
 
     @checked(scene=SCENE, discretization=MESH, comm=RANKS, spectrum=whole(4, 0), clock=a(Clock, "a Clock"))
     def __init__(
-        self, scene: Scene, discretization: Discretization | None = None, comm: MPI.Comm = MPI.COMM_WORLD, *,
-        spectrum: int = 0, clock: Clock | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        scene: Scene,
+        discretization: Discretization | None = None,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        *,
+        spectrum: int = 0,
+        clock: Clock | None = None,
+    ) -> None:
         """Set up the discrete rod, by default on 8 elements of degree 6.
 
         ``spectrum`` is the number of left-most eigenvalues that are recorded of each state (conservative scenes);

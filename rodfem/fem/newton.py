@@ -191,9 +191,12 @@ def relative_size(system: System, x: PETSc.Vec, step: PETSc.Vec) -> float:
 
 
 def relax(
-    system: System, x: PETSc.Vec, row: PETSc.Vec, longest: float = inf,
+    system: System,
+    x: PETSc.Vec,
+    row: PETSc.Vec,
+    longest: float = inf,
     accepts: Callable[[PETSc.Vec], bool] = lambda x: True,
-) -> NewtonResult:  # fmt: skip
+) -> NewtonResult:
     """Solve from a guess that is too far for Newton's method, in place, by pseudo-transient continuation.
 
     The overdamped motion ``M x' = -F(x)`` on the constraints is integrated by implicit Euler steps, ``(S + M/tau) dx =

@@ -56,9 +56,13 @@ class System:
     """
 
     def __init__(
-        self, scene: Scene, discretization: Discretization, comm: MPI.Comm = MPI.COMM_WORLD,
-        clock: Clock | None = None, symmetries: Sequence[Symmetry] | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        scene: Scene,
+        discretization: Discretization,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        clock: Clock | None = None,
+        symmetries: Sequence[Symmetry] | None = None,
+    ) -> None:
         self.scene, self.comm, self.damping = scene, comm, 0.0
         self.clock = clock or Clock()
         self.equations = Equations.of(scene, discretization, comm)

@@ -2,8 +2,6 @@
 
 An index is that of the step between two rows.  It is the greater one of both rows, but at a special point that is known
 before and after.
-
-Curves between rows, and nodes of a rod, are cubics here: ``scipy.interpolate`` takes a tenth of a second to load.
 """
 
 from __future__ import annotations
@@ -13,9 +11,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import FREQUENCY, KINDS
 from rodfem.errors import InputError
@@ -30,7 +25,6 @@ MEETS, SQUEEZED, BEGINS = "meets", "stretch reaches zero", "begins here: "
 of the note at the first row of a branch that was traced to both sides."""
 
 Branch = Mapping[str, Any]
-Floats = NDArray[np.float64]
 
 
 class Piece(NamedTuple):
@@ -218,45 +212,3 @@ def typical_state(data: Mapping[str, Any]) -> tuple[str, int, str]:
     row = min(range(piece.first, piece.last + 1), key=lambda row: abs(s[row] - wanted))
     words = in_short(piece.negative, piece.undecided, piece.kink, in_space=piece.in_space)
     return branch["name"], row, f"{branch['columns']['load'][row]:.4g}, {words}"
-
-
-# --- cubics
-
-
-def hermite(s: Floats, values: Floats, slopes: Floats, at: Floats) -> Floats:
-    """Cubics between places ``s`` (n,) with these ``values`` and ``slopes`` (n, ...) there, at other places."""
-    i = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
-    h, t = (x.reshape(x.shape + (1,) * (values.ndim - 1)) for x in (np.diff(s)[i], (at - s[i]) / np.diff(s)[i]))
-    ends = (1 + 2 * t) * (1 - t) ** 2 * values[i] + t**2 * (3 - 2 * t) * values[i + 1]
-    return np.asarray(ends + h * t * (1 - t) * ((1 - t) * slopes[i] - t * slopes[i + 1]))
-
-
-def akima_slopes(s: Floats, values: Floats) -> Floats:
-    """Slopes of ``values`` (n,) that keep corners: H. Akima, J. ACM 17 (1970) 589-602."""
-    m = np.diff(values) / np.diff(s)
-    m = np.concatenate([[3 * m[0] - 2 * m[1], 2 * m[0] - m[1]], m, [2 * m[-1] - m[-2], 3 * m[-1] - 2 * m[-2]]])
-    left, right = abs(np.diff(m))[:-2], abs(np.diff(m))[2:]
-    defined = left + right > 1e-9 * (left + right).max()  # else the mean of two slopes, as in SciPy
-    total = np.where(defined, left + right, 1.0)
-    return np.where(defined, (right * m[1:-2] + left * m[2:-1]) / total, (m[:-3] + m[3:]) / 2)
-
-
-def spline(s: Floats, values: Floats, at: Floats) -> Floats:
-    """Cubic spline through ``values`` (n, k) at ``s`` (n,), at other places: no knot is second, or last but one."""
-    n, h = len(s), np.diff(s)
-    if not ((h > 0).all() and np.isfinite(values).all()):
-        raise ValueError("a curve has no numbers at rising arclengths")
-    if n < 4:
-        return np.asarray(np.vander(at - s[0], n) @ np.linalg.solve(np.vander(s - s[0], n), values))
-    rates, both = np.diff(values, axis=0) / h[:, None], h[1:] + h[:-1]
-    inner = [h[1:], 2 * both, h[:-1], 3 * (h[1:, None] * rates[:-1] + h[:-1, None] * rates[1:])]
-    rows = np.pad(np.column_stack(inner), ((1, 1), (0, 0)))  # of the slopes before, at, and after each place
-    for end, (x, y), (a, b) in ((0, h[:2], rates[:2]), (-1, h[:-3:-1], rates[:-3:-1])):
-        rows[end, 1], rows[end, 2 + 2 * end] = y, x + y
-        rows[end, 3:] = ((x + 2 * (x + y)) * y * a + x * x * b) / (x + y)
-    for before, row in pairwise(rows):
-        row[[1, *range(3, len(row))]] -= row[0] / before[1] * before[2:]
-    d = np.zeros((n + 1, values.shape[1]))
-    for i in reversed(range(n)):
-        d[i] = (rows[i, 3:] - rows[i, 2] * d[i + 1]) / rows[i, 1]
-    return hermite(s, values, d[:-1], at)

@@ -14,10 +14,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
+from scipy.spatial import KDTree
 
 from rodfem.continuation.kinds import KINDS
 from rodfem.output import style
-from rodfem.output.pieces import COUNTED, Piece, akima_slopes, endings, hermite, pieces_of
+from rodfem.output.pieces import COUNTED, Piece, endings, pieces_of
 from rodfem.output.style import END, FONT, HALO, LINES, PALETTE
 from rodfem.output.words import mesh_in_words, rounded_up
 from rodfem.stability.soft_mode import STABLE
@@ -172,9 +174,9 @@ def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[floa
     taken, written = [*curves, *([axes.transData.transform(marks)] if marks else [])], set[tuple[str, str]]()
     for line, curve in sorted(zip(lines, curves, strict=True), key=lambda pair: -len(pair[1])):
         half = np.array([0.33 * len(line.piece.label) + 0.1, 0.45]) * FONT * axes.figure.dpi / 72
-        places, others = _label_places(curve, half), np.concatenate(taken)
+        places, tree = _label_places(curve, half), KDTree(np.concatenate(taken))
         corner = np.array([*product((-1, 0, 1), repeat=2)]) * half
-        room = np.array([_room(place + corner, others) for place in places])
+        room = np.array([min(tree.query(place + corner)[0].min(), GAP) for place in places])
         inside = np.all((places - half > axes.bbox.min) & (places + half < axes.bbox.max), axis=1)
         best = int(np.argmax(np.where(inside, room, -1.0)))
         name = line.colour, line.piece.label
@@ -184,12 +186,6 @@ def _write_indices(axes: Axes, lines: Sequence[Line], marks: Sequence[tuple[floa
             at = axes.transData.inverted().transform(places[best])
             look = {"ha": "center", "va": "center", "weight": "bold", "zorder": 6, "path_effects": HALO}
             axes.annotate(line.piece.label, tuple(at), color=line.colour, in_layout=False, **look)
-
-
-def _room(word: Floats, others: Floats) -> float:
-    """Distance of the places (9, 2) of a word from other points (n, 2), in pixels, :data:`GAP` at most."""
-    near = others[((others > word[0] - GAP) & (others < word[-1] + GAP)).all(axis=1)]
-    return float(np.hypot(*(near[:, None] - word).T).min(initial=GAP))
 
 
 def dense(axes: Axes, curve: Floats) -> Floats:
@@ -245,7 +241,7 @@ def dense_rows(branch: Mapping[str, Any], name: str) -> dict[int, Floats]:
         return {}
     shares = np.linspace(0.0, 1.0, 9)[1:-1]
     places = s[:-1, None] + shares * np.diff(s)[:, None]
-    curves = hermite(s, loads, slopes, places), hermite(s, values, akima_slopes(s, values), places)
+    curves = CubicHermiteSpline(s, loads, slopes)(places), Akima1DInterpolator(s, values)(places)
     seen, smooth = np.zeros(len(places), dtype=bool), np.ones(len(places), dtype=bool)
     for rows, curve in zip((loads, values), curves, strict=True):
         off = abs(curve - rows[:-1, None] - shares * np.diff(rows)[:, None]).max(axis=1)

@@ -209,9 +209,15 @@ def thickness(centres: Floats) -> float:
 
 
 def view_of(
-    reference: Floats, moved: Floats, *, axis: Floats | None = None, down: Floats | None = None,
-    load: Floats | None = None, side: Floats | None = None, feet: bool = False,
-) -> Floats:  # fmt: skip
+    reference: Floats,
+    moved: Floats,
+    *,
+    axis: Floats | None = None,
+    down: Floats | None = None,
+    load: Floats | None = None,
+    side: Floats | None = None,
+    feet: bool = False,
+) -> Floats:
     """Axes of a picture as rows (3, 3): to the right, upwards, and to the viewer.
 
     The rod has ``moved`` (n, 3) from the centreline ``reference`` (n, 3).  Directions (3,) are the ``axis`` of the rod
@@ -321,9 +327,12 @@ class Snapshot:
 
 
 def snapshot(
-    branches: Sequence[Branch], solvers: Sequence[BranchSolver], point: Point, path: Path | str | None,
+    branches: Sequence[Branch],
+    solvers: Sequence[BranchSolver],
+    point: Point,
+    path: Path | str | None,
     caption: str | None,
-) -> Snapshot:  # fmt: skip
+) -> Snapshot:
     """Draw a point of a diagram: pictures are made from files, so that its state is written to a temporary one."""
     from rodfem.continuation.branch import Branch
     from rodfem.output.files import states_of
@@ -350,10 +359,8 @@ def snapshot(
 
 PROGRAM = """
 import os, sys
-from rodfem.libraries import terse_matplotlib
-with terse_matplotlib():
-    from rodfem.output.render import drawn
-    words = drawn(*sys.argv[1:])
+from rodfem.output.render import drawn
+words = drawn(*sys.argv[1:])
 print(words or "", file=sys.stderr, flush=True)
 os._exit(bool(words))  # to take VTK down takes a tenth of a process
 """

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from rodfem.continuation.branch import COLUMNS, Branch
 from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.libraries import optional
 from rodfem.modes.modes import load_modes, rows_with_modes, stacked
-from rodfem.output.pieces import spline
 from rodfem.output.table import reactions_by_name
 from rodfem.output.words import row_of
 from rodfem.problem.quaternions import directors
@@ -154,8 +154,8 @@ def curve_at(group: Mapping[str, Any], row: int, at: int | Floats) -> tuple[Floa
     opposite = np.sum(q[1:] * q[:-1], axis=1) < 0.0  # q and -q are the same rotation
     signs = np.append(1.0, np.cumprod(np.where(opposite, -1.0, 1.0)))
     at = np.linspace(s[0], s[-1], at) if isinstance(at, int) else at
-    turned = spline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None], at)
-    return at, spline(s, r, at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    turned = CubicSpline(s, q * (signs / np.linalg.norm(q, axis=1))[:, None])(at)
+    return at, CubicSpline(s, r)(at), turned / np.linalg.norm(turned, axis=1, keepdims=True)
 
 
 # --- ParaView

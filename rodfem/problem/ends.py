@@ -424,9 +424,12 @@ def hinged(
 
 
 def sliding_hinge(
-    axis: tuple[float, float, float], along: tuple[float, float, float], position: Given = (0.0, 0.0, 0.0),
-    rotation: Given = IDENTITY, force: Given = None,
-) -> SlidingHinge:  # fmt: skip
+    axis: tuple[float, float, float],
+    along: tuple[float, float, float],
+    position: Given = (0.0, 0.0, 0.0),
+    rotation: Given = IDENTITY,
+    force: Given = None,
+) -> SlidingHinge:
     """Return an end that turns about one ``axis`` only, and slides along a direction of space.
 
     ``axis`` is given along the directors of ``rotation``, ``along`` in space, any vector but zero; ``position`` (3,) is

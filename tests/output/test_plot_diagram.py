@@ -8,12 +8,10 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.image import imread
-from numpy.testing import assert_allclose
-from scipy import interpolate
 from scipy.special import ellipe, ellipk
 
 from rodfem.file_format import LOCUS
-from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, akima_slopes, hermite, pieces_of, spline
+from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
 from rodfem.output.plot_diagram import (
     SINGULAR,
     UNEXPLAINED,
@@ -195,14 +193,3 @@ def test_what_a_diagram_does_not_explain_is_marked() -> None:
     assert not {*marks} & {*legend(plain)}
     for mark, more in marks.items():
         assert mark in legend(plain | more)
-
-
-@pytest.mark.parametrize("count", [2, 3, 4, 5, 49])
-def test_cubics_are_those_of_scipy(count: int) -> None:
-    rng = np.random.default_rng(count)
-    s, values = np.cumsum(rng.uniform(0.3, 1.0, count)), rng.normal(size=(count, 3))
-    at, (y, slopes, _) = np.linspace(s[0], s[-1], 101), values.T
-    assert_allclose(spline(s, values, at), interpolate.CubicSpline(s, values)(at), atol=1e-13)
-    assert_allclose(hermite(s, y, slopes, at), interpolate.CubicHermiteSpline(s, y, slopes)(at), atol=1e-13)
-    if count > 2:
-        assert_allclose(akima_slopes(s, y), interpolate.Akima1DInterpolator(s, y).derivative()(s), atol=1e-13)
