@@ -33,8 +33,8 @@ from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.dependence import smallest_singular
-from rodfem.stability.inertia import Inertia
-from rodfem.stability.near_zero import decide, quotient_error
+from rodfem.stability.inertia import Inertia, quotient_error
+from rodfem.stability.near_zero import decide
 
 sys.path.append(str(ROOT / "tests"))
 

@@ -129,7 +129,6 @@ class OrdinateBound:
 class RicherPoint(Origin):
     """A point computed again on a richer mesh, and what is left open; ``rho`` is the part of the errors left there."""
 
-    ordinate_error: float
     rho: float
     changed: float
     last: PETSc.Vec
@@ -145,10 +144,6 @@ class RicherPoint(Origin):
             f"The richer mesh has another state at load {load:.8g}: its strains differ by {self.changed:.2g} of "
             f"themselves, more than {RESOLVED_TO:g}; use more elements."
         )
-
-    def errors(self, point: Point) -> tuple[float, float]:
-        """Bounds of the errors in load and ordinate of the point as first computed."""
-        return bound(point.load, self.load, self.load_left, self.rho), self.ordinate_error
 
 
 class Enriched:
@@ -172,6 +167,11 @@ class Enriched:
         # the last coefficients may be small by coincidence; beyond three quarters neither mesh resolves the state
         return max(halved(degree), min(2 * last / max(first, RESOLVED), 0.75))
 
+    def errors(self, point: Point, again: RicherPoint) -> tuple[float, float]:
+        """Bounds of the errors in load and ordinate of a point as first computed, by that computed ``again``."""
+        of_load = bound(point.load, again.load, again.load_left, again.rho)
+        return of_load, self.of_ordinate(point.x, again.x, again.ordinate_left, again.rho)
+
     def estimate(self, special: SpecialPoint) -> None:
         """Set the errors of a special point, infinite if the richer mesh has none, and whether it is ``resolved``."""
         if special.test_function == "stretch":
@@ -188,7 +188,7 @@ class Enriched:
             special.resolved = False
             special.note = "; ".join(filter(None, (special.note, f"no error estimate: {trouble}")))
             return
-        load_error, special.ordinate_error = again.errors(point)
+        load_error, special.ordinate_error = self.errors(point, again)
         special.resolved = again.resolved
         special.error_estimate = special.ordinate_error if at_a_load else max(load_error, special.located_to)
         special.bounds = cache(partial(derived, (self.coarse, self.solver), (point.x, again.x, again.last), again.rho))
@@ -219,9 +219,7 @@ class Enriched:
         moved = np.abs(np.subtract(last, (load, ordinate)))
         left = STEADY * moved + ROUND_OFF * np.maximum((units.load, units.ordinate), np.abs(last))
         changed = self.indicator.changed(first, x, state=True)
-        rho = self.rho([point.x], [x])
-        ordinate_error = self.of_ordinate(point.x, x, float(left[1]), rho)
-        return RicherPoint(x, *last, float(left[0]), float(left[1]), ordinate_error, rho, changed, x - before)
+        return RicherPoint(x, *last, float(left[0]), float(left[1]), self.rho([point.x], [x]), changed, x - before)
 
     def law(self, special: SpecialPoint, direction: PETSc.Vec, law: NormalForm) -> None:
         """Set the uncertainty of a law of the first mesh: that of the rod's law, infinite without another."""
@@ -245,8 +243,7 @@ class Enriched:
         left = slope * along + round_off(ordinate, units.ordinate)
         changed = self.indicator.changed(x, found, state=True)
         rho = max(self.rho([point.x], [found]), LEFT)
-        ordinate_error = self.of_ordinate(point.x, found, left, rho)
-        return RicherPoint(found, load, ordinate, load_left, left, ordinate_error, rho, changed, tangent * along)
+        return RicherPoint(found, load, ordinate, load_left, left, rho, changed, tangent * along)
 
     def _located(self, special: SpecialPoint) -> RicherPoint:
         """The fold or branch point on the richer mesh, and its ordinate: the same singular system."""
@@ -268,8 +265,7 @@ class Enriched:
         sharp = combine(relaxed, np.array([(metric * v).dot(modes[0]) for v in relaxed]))
         rho = self.rho([point.x, special.null_vectors[0]], [found.x, sharp])
         changed = max(indicator.changed(x, found.x, state=True), indicator.changed(modes[0], sharp, state=False))
-        ordinate_error = self.of_ordinate(point.x, found.x, left, rho)
-        again = RicherPoint(found.x, found.load, ordinate, load_left, left, ordinate_error, rho, changed, found.last)
+        again = RicherPoint(found.x, found.load, ordinate, load_left, left, rho, changed, found.last)
         self.origins.append((special, again))
         return again
 
@@ -323,7 +319,7 @@ def _sharpen(solver: BranchSolver, end: SpecialPoint) -> None:
         mesh = d.finer(factor, richer=int(d.degree < HIGHEST))  # the forms of :class:`Enriched` serve
         fine = solver.on_mesh(mesh)
         x = _vanishing(fine, fine.shape.restore(sample), end.point)
-        point = replace(end.point, x=x, tangent=None, load=fine.system.scalar(x), energy=fine.energy(x))
+        point = replace(end.point, x=x, tangent=None, load=fine.system.scalar(x), energy=fine.system.at(x).energy())
         found.append(replace(point, ordinate=fine.shape.ordinate(x), stretch=fine.shape.stretch(x)))
         sample = fine.shape.sample(x)
     before, point = found

@@ -153,23 +153,22 @@ class AccuracyControl:
 
     def row(self, point: Point, solver: BranchSolver) -> None:
         """Estimate the error of a point, by computation where need be; raises :class:`TooCoarse`."""
-        if self.meshes.accuracy is not None:
-            self._estimate(point, solver)
-            self.accepted = [*self.accepted[-1:], point.arclength]
-
-    def _estimate(self, point: Point, solver: BranchSolver) -> None:
+        if self.meshes.accuracy is None:
+            return
         indicator = self.meshes.indicator(solver.mesh)(point.x).indicator
         if self.checked is not None and self.checked[2] < SELDOM and not self._at_bound(point):
             before, error, since = self.checked
             point.estimate = error * max(1.0, indicator / before)
             if indicator < GROWN * before or 10 * point.estimate < self.accuracy:
                 self.checked = before, error, since + 1
+                self.accepted = [*self.accepted[-1:], point.arclength]
                 return
         with solver.system.clock.scope("error bars"):
             point.estimate = self._computed(point)
         self.checked = max(indicator, TINY), point.estimate, 0
         if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
             raise TooCoarse(point, point.estimate)
+        self.accepted = [*self.accepted[-1:], point.arclength]
 
     def special(self, special: SpecialPoint) -> None:
         """Estimate the errors of a special point; raises :class:`TooCoarse` where another mesh may help."""
@@ -254,7 +253,7 @@ class AccuracyControl:
             modes = solver.inertia.modes_near_zero(point.x, abs(negative - point.negative), ROUGH)
             raise TooCoarse(point, inf, modes, why=f"index {point.negative}, {negative} on a richer mesh")
         values = (point.load, self.units.load), (point.ordinate, self.units.ordinate)
-        error = max(e / unit(v, one=one) for e, (v, one) in zip(again.errors(point), values, strict=True))
+        error = max(e / unit(v, one=one) for e, (v, one) in zip(richer.errors(point, again), values, strict=True))
         return error if again.resolved else max(error, GROWN * self.accuracy)
 
 

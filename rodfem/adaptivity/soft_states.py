@@ -39,9 +39,9 @@ from rodfem.continuation.observer import Remark
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.linalg.orthogonal import complement
-from rodfem.stability.inertia import NULL, ROUGH, Factored
+from rodfem.stability.inertia import NULL, ROUGH, SPARE, Factored
 from rodfem.stability.motion_names import names_for
-from rodfem.stability.near_zero import SPARE, NearZero, decide, near_zero, quotients, soft_limit
+from rodfem.stability.near_zero import NearZero, decide, near_zero, soft_limit
 from rodfem.stability.soft_mode import SoftMode, index_range
 
 if TYPE_CHECKING:
@@ -226,18 +226,13 @@ def _rank(metric: PETSc.Mat, vectors: Sequence[PETSc.Vec], others: Sequence[PETS
 
 def _counterpart(richer: Enriched, point: Point, fixed_load: bool, *, soft: bool = False) -> tuple[Point, RicherPoint]:
     """Point on a richer mesh, and what was found when it was computed there; or ConvergenceError."""
-    system = richer.system
-    given = system.damping
-    first, second = sorted((given, richer.solver.inertia.tolerance), reverse=soft)
+    first, second = sorted((richer.system.damping, richer.solver.inertia.tolerance), reverse=soft)
     try:
-        try:
-            system.damping = first
+        with richer.system.damped(first):
             again = richer.solve(point, fixed_load=fixed_load)
-        except ConvergenceError:
-            system.damping = second
+    except ConvergenceError:
+        with richer.system.damped(second):
             again = richer.solve(point, fixed_load=fixed_load)
-    finally:
-        system.damping = given
     if soft and not again.resolved:
         raise ConvergenceError(again.unlike(point.load))
     tangent = None if point.tangent is None else richer.transfer(point.tangent, state=False)
@@ -253,7 +248,7 @@ def _nearest(
     with solver.inertia.afresh():
         nearest = found.nearest(len(zeros) + number + SPARE, NULL)[1]
     vectors = [v for v in nearest if complement(solver.system.metric, [v], zeros)][:number]
-    q = quotients(found, vectors, TOLERANCE * solver.inertia.scale)
+    q = found.quotients(vectors, TOLERANCE * solver.inertia.scale)
     row = solver.axis if point.tangent is None else solver.row(point.tangent)
     settled = solver.inertia.at(stepped(solver, point.x, row))
     moved = abs(np.array([v.dot(settled.matrix * v).real for v in vectors]) - q.values)

@@ -26,7 +26,6 @@ from petsc4py import PETSc
 from rodfem.continuation.branch import Point
 from rodfem.continuation.crossings import Node, clear, places
 from rodfem.continuation.curves import ALIGNED, cubic, interpolant, zero_between
-from rodfem.continuation.curves import Knot as Row
 from rodfem.continuation.kinds import EVENT, LEVEL, Kind
 from rodfem.errors import SMALLER_STEPS, ConvergenceError, SceneError
 from rodfem.fem.checks import Convexity
@@ -51,14 +50,13 @@ DIFFERENCE, GENERIC = 1e-5, 1e-2
 
 def corrected(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
     """Equilibrium on the plane through ``start`` across a ``row``; raises :class:`ConvergenceError`."""
-    system, before = solver.system, solver.system.damping
-    try:  # next to a state that may move freely, where Newton's method slides away: with damping
-        for system.damping in dict.fromkeys((before, before or solver.inertia.tolerance)):
-            x = start.copy()
+    system, given = solver.system, solver.system.damping
+    # next to a state that may move freely, where Newton's method slides away: with damping
+    for damping in dict.fromkeys((given, given or solver.inertia.tolerance)):
+        x = start.copy()
+        with system.damped(damping):
             if correct(system, x, row).converged:
                 return x
-    finally:
-        system.damping = before
     raise ConvergenceError(
         f"No equilibrium near load {system.scalar(start):.8g} while locating a special point: {SMALLER_STEPS}."
     )
@@ -173,15 +171,11 @@ def stepped(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
     A state that slides away along a family makes one step with it.
     """
     system, settled = solver.system, x.copy()
-    given = system.damping
-    try:
-        system.damping = 0.0
+    with system.damped(0.0):
         if correct(system, settled, row, reach=1e-2).converged:
             return settled
-    finally:
-        system.damping = given
     system.set_phase(x)
-    step = linear_step(system, x, row, given or solver.inertia.tolerance)
+    step = linear_step(system, x, row, system.damping or solver.inertia.tolerance)
     return x if step is None else x - step
 
 
@@ -203,7 +197,7 @@ class Chord(ABC):
     differences of the arclengths of neighbouring rows.
     """
 
-    def __init__(self, solver: BranchSolver, a: Row, b: Row) -> None:
+    def __init__(self, solver: BranchSolver, a: Point | End, b: Point | End) -> None:
         self.solver, self.begin = solver, a.arclength
         self.chord = b.x - a.x
         self.length = self.solver.system.norm(self.chord)

@@ -263,12 +263,10 @@ class SpecialPoint:
     cluster: Cluster | None = None  #: the eigenvalues that collide
     event: Event | Level | None = None  #: the event that happens here, of those that the plan asks for
     bounds: Callable[[], dict[str, np.ndarray]] = dict  #: computes :attr:`errors`, once
-    derivatives: dict[str, tuple[float, float]] = field(
-        default_factory=dict
-    )  #: of the load, and bounds of their errors
-    densities: dict[str, tuple[np.ndarray, np.ndarray]] = field(
-        default_factory=dict
-    )  #: of these derivatives along the rod: ends (m + 1,) of pieces, and means (m,)
+    #: of the load, and bounds of their errors
+    derivatives: dict[str, tuple[float, float]] = field(default_factory=dict)
+    #: of these derivatives along the rod: ends (m + 1,) of pieces, and means (m,)
+    densities: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     @property
     def errors(self) -> dict[str, np.ndarray]:

@@ -29,7 +29,7 @@ from rodfem.fem.fields import Discretization
 from rodfem.fem.newton import FAR, STEPS, NewtonResult, correct
 from rodfem.fem.resultants import NAMES, Reactions, Resultants, reactions
 from rodfem.fem.shape import Shape
-from rodfem.fem.state import LOAD, Energies, NodalValues, State
+from rodfem.fem.state import LOAD, NodalValues, State
 from rodfem.fem.symmetries import Phase
 from rodfem.fem.system import System
 from rodfem.problem.units import Units
@@ -165,26 +165,18 @@ class BranchSolver:
         """Reactions of supports and attachments at the equilibrium ``x``."""
         return reactions(self.resultants, x)
 
-    def derived(self, x: PETSc.Vec, s: np.ndarray, modes: int = 0) -> dict[str, np.ndarray]:
+    def derived(self, x: PETSc.Vec, s: np.ndarray, modes: int) -> dict[str, np.ndarray]:
         """Numbers that follow from an equilibrium, by name: energies, reactions, left-most eigenvalues and profiles.
 
         ``reactions`` has force and moment, in space, of the left and right support and of attachments, (k, 2, 3).
         Profiles (m, 3) are those at arclengths ``s``.
         """
         profile = self.resultants.profile(x, s)
-        out = {name: np.array(value) for name, value in self.energies(x)._asdict().items()}
+        out = {name: np.array(value) for name, value in self.system.at(x).energies()._asdict().items()}
         out["reactions"] = self.reactions(x).all
         if modes:
-            out["spectrum"] = np.array((self.spectrum or SymmetricSolver(self.inertia)).at(x).leftmost(modes).values)
+            out["spectrum"] = np.array(self.spectrum.at(x).leftmost(modes).values)
         return out | {name: getattr(profile, name) for name in ("r", *NAMES)}
-
-    def energies(self, x: PETSc.Vec) -> Energies:
-        """Stored and potential energy of the equilibrium ``x``, and what the load does work on."""
-        return self.system.at(x).energies()
-
-    def energy(self, x: PETSc.Vec) -> float:
-        """Stored energy of the state ``x``."""
-        return self.system.at(x).energy()
 
     def lost_convexity(self, x: PETSc.Vec) -> str:
         """Why a branch ends at the state ``x``, where the stored energy is not convex any more; empty where it is."""
@@ -209,7 +201,8 @@ class BranchSolver:
     def start(self, load: float, bent: float = 0.0) -> PETSc.Vec:
         """First guess at ``load``: the scene's ``start`` rotation, or straight and turned as its ends are; no forces.
 
-        ``bent`` is the size, in radian, of a smooth rotation on top: a taut straight rod is a singular place to start.
+        ``bent`` is the size, in radian, of a smooth rotation on top that vanishes at both ends: a taut straight rod is
+        a singular place to start.
         """
         system, f = self.system, self.system.fields
         x = f.coordinates(f.discretization.degree)
@@ -217,7 +210,9 @@ class BranchSolver:
         turned = f.turning.start(start, x.ravel(), system.scene.interval)
         if bent:
             along = (x.ravel() - system.scene.interval[0]) / system.scene.length
-            turned = f.turning.turned(turned, bent * _bend(along))
+            first, second = (np.sin(number * np.pi * along) for number in (1, 2))
+            vector = np.outer(first, (0.6, 0.8, 0.3)) + np.outer(second, (0.5, -0.4, 0.2))
+            turned = f.turning.turned(turned, bent * vector)
         undeformed = np.array([1.0 if i == 2 else 0.0 for i in system.scene.free_strains])
         return self._shaped(turned, undeformed, load)
 
@@ -277,7 +272,7 @@ class BranchSolver:
             arclength=arclength,
             load=system.scalar(x),
             ordinate=self.shape.ordinate(x),
-            **self.energies(x)._asdict(),
+            **system.at(x).energies()._asdict(),
             stretch=self.shape.stretch(x),
             negative=index.negative,
             zero=index.zero,
@@ -365,8 +360,3 @@ class BranchSolver:
         if not increasing:
             tangent.scale(-1.0)
         return tangent
-
-
-def _bend(x: np.ndarray) -> np.ndarray:
-    """Smooth rotation vector of size about one that vanishes at both ends, (m, 3); ``x`` (m,) in [0, 1]."""
-    return np.outer(np.sin(np.pi * x), (0.6, 0.8, 0.3)) + np.outer(np.sin(2 * np.pi * x), (0.5, -0.4, 0.2))

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import copysign
 from sys import float_info
-from typing import Protocol
 
 import numpy as np
 from petsc4py import PETSc
@@ -29,14 +28,6 @@ ALIGNED = 0.9
 ROWS = 4
 """Rows of a branch that a prediction extrapolates, at most."""
 NEIGHBOURS = 4 * float_info.epsilon  # relative distance of neighbours
-
-
-class Knot(Protocol):
-    """A state ``x`` of a curve at its ``arclength``, and the ``tangent`` there, where it is known."""
-
-    arclength: float
-    x: PETSc.Vec
-    tangent: PETSc.Vec | None
 
 
 def lagrange(nodes: np.ndarray, s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +77,7 @@ def cubic_weights(h: float, s: float) -> tuple[np.ndarray, np.ndarray]:
     return value, np.array([-6 * t * (1 - t) / h, (1 - t) * (1 - 3 * t), 6 * t * (1 - t) / h, t * (3 * t - 2)])
 
 
-def interpolant(a: Knot, b: Knot, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
+def interpolant(a: Point, b: Point, s: float) -> tuple[PETSc.Vec, PETSc.Vec]:
     """State and direction at ``s`` on the polynomial of least degree through two states and what tangents they have."""
     h = b.arclength - a.arclength
     if a.tangent is not None and b.tangent is not None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 from mpi4py import MPI
@@ -19,7 +20,7 @@ from rodfem.continuation.crossings import REAL
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, Measured
 from rodfem.stability.nonsymmetric import ALIKE, Frequencies, groups, orthonormal, product, squares
-from rodfem.tolerances import ROUND_OFF, TINY
+from rodfem.tolerances import ROUND_OFF, TINY, unit
 
 SHARP, ENOUGH = 1e-11, 1e-8
 """Uncertainties of a load, relative to it, at which the search ends: at once, and at an interval that is no better."""
@@ -28,7 +29,10 @@ NODES = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
 OUTSIDE = 1.5
 """Distance from the middle, in half lengths of its interval, up to which a series is extrapolated to a zero."""
 
+AROUND = (1e-4, 1e-5, 1e-6)  # half widths, relative to a divergence load, over which its eigenvalues are sampled
+
 AtLoad = Callable[[float, Cluster], Measured]
+Number = Callable[[float], float]
 
 
 class Curves:
@@ -146,6 +150,41 @@ def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> L
     if not np.isfinite(best.uncertainty):
         raise ConvergenceError(f"The flutter load near {load:.6g} could not be located: use a smaller range.")
     return best
+
+
+def interpolated_zero(mean: Number, noise: Number, load: float, one: float) -> tuple[float, float]:
+    """Load near ``load`` at which a ``mean`` of eigenvalues vanishes, and what its ``noise`` leaves open.
+
+    Both are functions of the load, of natural size ``one``; raises :class:`ConvergenceError`.
+    """
+    found = list[tuple[float, float]]()
+    for half in (width * unit(load, one=one) for width in AROUND):
+        try:
+            series = interpolant([mean(load + half * t) for t in NODES.tolist()])
+            root = real_root(series)
+            if root is None:
+                continue
+            doubt = in_doubt(series) + noise(load + half * root)
+        except ConvergenceError:
+            continue
+        found.append((half * zero_uncertainty(series, root, doubt), load + half * root))
+        if found[-1][0] < ENOUGH * unit(load, one=one):
+            break
+    if not found:
+        raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
+    uncertainty, at = min(found)
+    return at, uncertainty
+
+
+def zero_near(mean: Number, noise: Number, load: float, one: float) -> tuple[float, float]:
+    """The same on another mesh than that of a ``load``, by secants first."""
+    from scipy.optimize import newton  # slow to load
+
+    step = AROUND[-1] * unit(load, one=one)
+    with catch_warnings():  # two equal values end the secants
+        simplefilter("ignore", RuntimeWarning)
+        near = newton(mean, load, x1=load + step, tol=step, full_output=True, disp=False)[0]
+    return interpolated_zero(mean, noise, float(near), one)
 
 
 def _series(found: Sequence[tuple[Measured, float]]) -> tuple[np.ndarray, np.ndarray]:

@@ -43,9 +43,8 @@ def first_equilibrium(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, New
     outcome, good = (outcome, True) if _resembles(system, guess, x, outcome) else examined(solver, x, outcome)
     if good and not _may_move(solver, x):
         return x, outcome
-    damping, system.damping = system.damping, STILL * system.stiffness_scale
-    other = solver.at_load(guess, load)  # the start may be one of a family, along which it need not move
-    system.damping = damping
+    with system.damped(STILL * system.stiffness_scale):
+        other = solver.at_load(guess, load)  # the start may be one of a family, along which it need not move
     if _resembles(system, guess, *other):
         return other
     if not good and (down := downhill(solver, load))[1].converged:

@@ -29,7 +29,7 @@ from rodfem.errors import ConvergenceError, InputError, many
 from rodfem.fem.newton import VIOLATED, violation
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
-from rodfem.problem.arguments import finite, real, whole
+from rodfem.problem.arguments import convert, finite, real, whole
 from rodfem.tolerances import NEGLIGIBLE, SAME_LOAD
 
 FAILURES = 2
@@ -54,8 +54,7 @@ class StepControl:
 
     def __post_init__(self) -> None:
         """Check kinds and the largest step; raises :class:`InputError`."""
-        for name in ("first", "largest", "smallest", "aim"):
-            object.__setattr__(self, name, real(getattr(StepControl, name))(name, getattr(self, name)))
+        convert(self, **{name: real(getattr(StepControl, name)) for name in ("first", "largest", "smallest", "aim")})
         if whole(StepControl.most)("most", self.most) < 1:
             raise InputError(f"most is {self.most}: a branch has at least one point; give most=1 or more.")
         if not self.smallest < self.largest <= 1:
@@ -157,9 +156,9 @@ class _Walk:
     def go_on(self, point: Point) -> None:
         """Go on from an accepted point: from one at a stop with the tangent, and the work of the load, ahead."""
         if self._offset:
-            x = _moved(self.solver, point.x, self._offset)
+            x, system = _moved(self.solver, point.x, self._offset), self.solver.system
             point.tangent = self.solver.load_tangent(x, self._offset > 0)
-            point.slope, point.conjugate = self.solver.system.scalar(point.tangent), self.solver.energies(x).conjugate
+            point.slope, point.conjugate = system.scalar(point.tangent), system.at(x).energies().conjugate
         self._step, self._missed, self._failures = self._next, "", 0
 
     def _stops(self, load: float) -> tuple[float, float]:
@@ -226,7 +225,7 @@ class _Walk:
         if not solver.row(direction).dot(tangent) > ALIGNED:
             return None
         point = solver.point(x, last.arclength + system.distance(last.x, x), tangent, outcome)
-        point.conjugate = solver.energies(before).conjugate
+        point.conjugate = system.at(before).energies().conjugate
         return point
 
     def _halve(self, last: Point, most: float) -> None:

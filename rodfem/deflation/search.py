@@ -169,7 +169,7 @@ class Deflation:
     def _deflate(self, x: PETSc.Vec) -> None:
         """Add a state and its mirror images to what is known."""
         self.bases.append(x)
-        self.energies.append(self.solver.energy(x))
+        self.energies.append(self.system.at(x).energy())
         for image in (x, *(mirror(self.solver.shape, x) for mirror in self.mirrors)):
             if self.known.distance(image) > APART:
                 self.known.add(image)

@@ -25,23 +25,24 @@ and so is the upper half of a mesh's: it tells of the mesh rather than of the ro
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isnan, nan
 from typing import NamedTuple
 
 import numpy as np
+from petsc4py import PETSc
 
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.curves import zero_between
-from rodfem.continuation.eigenvalue_curves import SHARP, assignment
-from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
-from rodfem.diagram.collisions import Critical, Mean, Measuring, Side, cluster_at, interpolated_zero, located_flutter
+from rodfem.continuation.eigenvalue_curves import SHARP, Located, assignment, interpolated_zero, locate_flutter
+from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, Kind
 from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
-from rodfem.stability.cluster import Cluster, Measured, measure
-from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricSolver, groups
-from rodfem.stability.spectrum import Spectrum, inside, times
-from rodfem.tolerances import ROUND_OFF, SAME_LOAD, SAME_SPECIAL, round_off, unit
+from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
+from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricPencil, NonsymmetricSolver, groups
+from rodfem.stability.spectrum import SHIFT, Spectrum, inside, times
+from rodfem.tolerances import ROUND_OFF, SAME_LOAD, SAME_SPECIAL, TINY, round_off, unit
 
 PARTS, PART = 100, 0.47
 """Times that steps of a sweep are parted, at most, and where: not in the middle, which is likely to be special."""
@@ -53,6 +54,90 @@ JUST_MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
 MOVED, OUTSIDE = 0.3, 0.2
 """Change of a complex eigenvalue, relative, and share of its vector outside a pair's plane, of another one."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One end of a step: its ``load``, the equilibrium ``x`` there, and its ``spectrum``."""
+
+    load: float
+    x: PETSc.Vec
+    spectrum: Spectrum
+
+
+@dataclass
+class Critical:
+    """A critical load, before its state is evaluated, at which a cluster of eigenvalues collides or passes zero."""
+
+    kind: Kind
+    load: float
+    change: int  # of the number of unstable eigenvalues
+    uncertainty: float
+    omega2: float
+    cluster: Cluster | None = None  # None where round-off hides a collision: the pair is complex at both ends
+    note: str = ""
+    zeros: int = 0  # eigenvalues of the cluster that are zero at all loads, those of rigid motions
+
+
+def cluster_at(pencil: NonsymmetricPencil, spectrum: Spectrum, places: list[int]) -> Cluster:
+    """Cluster of some eigenvalues of a state's ``spectrum``, and the conjugates of complex ones."""
+    found = pencil.frequencies(spectrum, np.array(places))
+    conjugates = [found.vectors.conj()] if found.values.imag.any() else []
+    vectors = np.concatenate([found.vectors, *conjugates], axis=1)
+    return Cluster(real_span(pencil, vectors), float(found.values.real.mean()))
+
+
+class Measuring:
+    """A cluster of eigenvalues against the load: at the equilibrium near a ``guess``."""
+
+    def __init__(self, solver: BranchSolver, eigensolver: NonsymmetricSolver, guess: PETSc.Vec) -> None:
+        self.solver, self.eigensolver, self.guess = solver, eigensolver, guess
+
+    def __call__(self, load: float, cluster: Cluster) -> Measured:
+        """Measure a cluster; raises :class:`ConvergenceError` where it is not found."""
+        return measure(self.pencil(load), cluster)
+
+    def noise(self, load: float, cluster: Cluster) -> ClusterNoise:
+        """Round-off of what is measured; raises :class:`ConvergenceError` where the cluster is not found."""
+        pencil = self.pencil(load)
+        return noise_of(pencil, measure(pencil, cluster))
+
+    def pencil(self, load: float) -> NonsymmetricPencil:
+        """Pencil at a load."""
+        return self.eigensolver.at(at_load(self.solver, self.guess, load))
+
+
+def located_flutter(measured: Measuring, cluster: Cluster, load: float, width: float) -> Located:
+    """Collision of a ``measured`` ``cluster``, from about a ``load`` on, in pieces of the half ``width`` at first."""
+    found = locate_flutter(measured, cluster, load, width)
+    noise, clear = measured.noise(found.clear, found.cluster), measured(found.clear, found.cluster)
+    moved = (noise.of_discriminant + clear.split) / abs(found.slope)
+    left = noise.of_mean + clear.split / max(2 * float(np.sqrt(abs(clear.discriminant))), TINY)
+    return replace(found, uncertainty=found.uncertainty + moved, left=found.left + left)
+
+
+@dataclass(frozen=True)
+class Mean:
+    """Mean of the eigenvalues of a ``measured`` ``cluster`` against the load, ``zeros`` of which are zero at all loads.
+
+    Vectors of those are no better than round-off: where there are any, the eigenvalues nearest zero are taken.
+    """
+
+    measured: Measuring
+    cluster: Cluster
+    zeros: int
+
+    def __call__(self, load: float) -> float:
+        """Mean at a load; raises :class:`ConvergenceError` where the cluster is not found."""
+        if not self.zeros:
+            return self.measured(load, self.cluster).cluster.mean
+        pencil, size = self.measured.pencil(load), self.cluster.size
+        values = pencil.nearest(size + 2, SHIFT * pencil.system.scene.units.omega2).values
+        return float(values[np.argsort(abs(values), kind="stable")[:size]].real.mean())
+
+    def noise(self, load: float) -> float:
+        """Round-off of the matrix in the mean, which does not scatter; unknown, and zero, where some are zero."""
+        return 0.0 if self.zeros else self.measured.noise(load, self.cluster).mean
 
 
 class CriticalLoads:
@@ -159,7 +244,7 @@ class CriticalLoads:
             if mean(low) * mean(high) > 0.0:
                 raise ConvergenceError(f"A pair was lost between {low:.6g} and {high:.6g}: use a smaller range.")
             near = zero_between(mean, low, high, CLOSEST * (high - low))
-        load, uncertainty = interpolated_zero(mean, near, self.units.load)
+        load, uncertainty = interpolated_zero(mean, mean.noise, near, self.units.load)
         inside = min(max(load, low), high)
         found = mean.measured(inside, cluster)
         uncertainty += abs(load - inside)
@@ -214,7 +299,7 @@ class CriticalLoads:
             self.eigensolver.at(at.x), at.spectrum, places[at.spectrum.values[places].imag >= 0.0].tolist()
         )
         mean = Mean(Measuring(self.solver, self.eigensolver, a.x), cluster, self._zeros)
-        load, uncertainty = interpolated_zero(mean, loads[0], self.units.load)
+        load, uncertainty = interpolated_zero(mean, mean.noise, loads[0], self.units.load)
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))
         inside = min(max(load, bounds[0]), bounds[1])
         uncertainty += abs(load - inside)

@@ -293,10 +293,8 @@ class SpecialSearch:
         """
         (p, q), solver = ends, piece.solver
         margin = ASIDE * (q.s - p.s)
-        left, right = (
-            piece.solve(p, q, max(s - margin, (p.s + s) / 2)),
-            piece.solve(p, q, min(s + margin, (s + q.s) / 2)),
-        )
+        sides = max(s - margin, (p.s + s) / 2), min(s + margin, (s + q.s) / 2)
+        left, right = (piece.solve(p, q, at) for at in sides)
         if left is None or right is None or (turn := piece.turn(left, right)) is None:
             return None
         at = of_turn(piece, left, right, turn)

@@ -18,12 +18,11 @@ from rodfem.adaptivity.error_estimate import Enriched, bound, derived
 from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.eigenvalue_curves import Curves
+from rodfem.continuation.eigenvalue_curves import Curves, zero_near
 from rodfem.continuation.follow import require_equilibrium
 from rodfem.continuation.kinds import DIVERGENCE, END, FLUTTER, USER
 from rodfem.continuation.observer import Observer, Remark
-from rodfem.diagram.collisions import Critical, Mean, Measuring, Side, located_flutter, zero_near
-from rodfem.diagram.critical_loads import CriticalLoads
+from rodfem.diagram.critical_loads import Critical, CriticalLoads, Mean, Measuring, Side, located_flutter
 from rodfem.diagram.doubts import Quadrature
 from rodfem.diagram.equilibria import LoadSteps, at_load, first_state, name_of_first
 from rodfem.diagram.plan import Plan
@@ -333,7 +332,8 @@ class SweepErrors(Enriched):
                 load, left = self._flutter(measured, cluster, s)
             else:
                 zeros = cluster.size - abs(s.negative_after - s.negative_before)
-                load, left = zero_near(Mean(measured, cluster, zeros), point.load, self.units.load)
+                mean = Mean(measured, cluster, zeros)
+                load, left = zero_near(mean, mean.noise, point.load, self.units.load)
                 left = max(left, s.located_to)
                 if s.kind == FLUTTER:
                     s.omega2_error = bound(s.omega2, measured(load, cluster).frequency ** 2, ROUND_OFF * s.omega2, rho)

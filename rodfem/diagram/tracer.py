@@ -182,9 +182,8 @@ class Tracer:
         self._check_symmetry(row)
         require_equilibrium(self.solvers[row.mesh], row)
         self.control.row(row, self.solver)
-        known = [
-            p for p in history if p.arclength > 0.0 or branch.parent is None
-        ]  # a branch point has zeros of its own
+        # a branch point has zeros of its own
+        known = [p for p in history if p.arclength > 0.0 or branch.parent is None]
         self.zeros.check(self.solver, known, row, self.specials.undecided)
         if row.stretch <= 0:
             self._end_at_zero_stretch(branch, previous, row)

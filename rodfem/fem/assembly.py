@@ -72,10 +72,8 @@ class Cells:
     def of(cls, fields: Fields) -> Cells:
         """Those of ``fields`` on this rank, ghosts last."""
         count = len(fields.vertices)
-        return cls(
-            np.ascontiguousarray(compat.cell_coordinates(fields.mesh, count), dtype=float),
-            np.ascontiguousarray(compat.cell_dofs(fields.space, count), dtype=np.int32),
-        )
+        x, dofs = compat.cell_coordinates(fields.mesh, count), compat.cell_dofs(fields.space, count)
+        return cls(np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(dofs, dtype=np.int32))
 
 
 class Assembler:

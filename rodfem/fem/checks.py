@@ -263,15 +263,11 @@ class QuadratureCheck:
         dofs += [copies for _, copies in self._positions()]
         here, motion = state.covector(), self._moved(state.local) - state.local
 
-        def changes(size: float) -> tuple[np.ndarray, np.ndarray]:
+        def changes(size: float) -> list[np.ndarray]:
             # largest sum of the changes in two opposite motions, and largest change, by kind of row
-            ahead, back = (
-                NodalValues(state.equations, state.local + sign * size * motion, state.line).covector() - here
-                for sign in (1.0, -1.0)
-            )
-            return self._largest([ahead[rows] + back[rows] for rows in dofs]), self._largest(
-                [ahead[rows] for rows in dofs]
-            )
+            moved = (NodalValues(state.equations, state.local + by * motion, state.line) for by in (size, -size))
+            ahead, back = (values.covector() - here for values in moved)
+            return [self._largest([change[rows] for rows in dofs]) for change in (ahead + back, ahead)]
 
         (uneven, change), (more, larger) = changes(little), changes(4 * little)
         bent = (uneven > felt * change) & (abs(more - 4 * uneven) < uneven)

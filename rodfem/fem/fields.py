@@ -25,6 +25,7 @@ from rodfem.fem.formulations import CONTACT_FORCE, Formulation, turning_of
 from rodfem.fem.state import LOAD
 from rodfem.linalg.chain import Chain, Factors
 from rodfem.linalg.factorization import Mumps, Sizes
+from rodfem.linalg.matrices import block_matrix
 from rodfem.problem.arguments import convert, optional, reals, whole
 from rodfem.problem.functions import Constants
 from rodfem.problem.units import Units
@@ -395,13 +396,11 @@ class Fields:
         """Matrix of the derivative of fields at the nodes of each cell, and the degrees of freedom of its rows."""
         found, sizes = [], np.diff(self.vertices, axis=1)[:, 0] / self.scene.units.length
         for block in blocks:
-            cells, nodes, components = (dofs := self.dofs[block.name]).shape
-            weights = _differentiation(block.degree) / sizes[:, None, None]
-            shape = (cells, nodes, components, nodes)
-            columns = np.broadcast_to(dofs.transpose(0, 2, 1)[:, None], shape).ravel()
-            values = np.broadcast_to(weights[:, :, None, :], shape).ravel()
-            rows = np.arange(dofs.size + 1) * nodes
-            found.append(sp.csr_matrix((values, columns, rows), shape=(dofs.size, len(self.number))))
+            dofs, weights = self.dofs[block.name], _differentiation(block.degree) / sizes[:, None, None]
+            numbers = np.arange(dofs.size).reshape(dofs.shape), dofs
+            rows, columns = (x.transpose(0, 2, 1).reshape(-1, dofs.shape[1]) for x in numbers)
+            each = np.repeat(weights, block.size, axis=0)  # component by component of a cell
+            found.append(block_matrix(each, rows, columns, (dofs.size, len(self.number))))
         return sp.vstack(found, format="csr"), np.concatenate([self.dofs[b.name].ravel() for b in blocks])
 
 

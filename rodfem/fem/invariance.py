@@ -121,20 +121,14 @@ def _keeping_loads(equations: Equations, found: list[Symmetry]) -> np.ndarray:
     return np.asarray(_null_space(np.array(conditions), round_off) / lengths[:, None])
 
 
-def _derivatives(
-    state: NodalValues, form: Assembler, changes: np.ndarray, step: float = 1e-3
-) -> tuple[np.ndarray, float]:
+def _derivatives(state: NodalValues, form: Assembler, changes: np.ndarray) -> tuple[np.ndarray, float]:
     """Derivatives of a potential of what acts on the rod along ``changes`` (m, local size), and its largest value."""
-    equations = state.equations
-    values = np.array(
-        [
-            [
-                NodalValues(equations, state.local + side * step * change, state.line).integral(form)
-                for side in (-2, -1, 1, 2)
-            ]
-            for change in changes
-        ]
-    )
+    step = 1e-3  # in natural sizes
+
+    def at(moved: np.ndarray) -> float:
+        return NodalValues(state.equations, state.local + moved, state.line).integral(form)
+
+    values = np.array([[at(side * step * change) for side in (-2, -1, 1, 2)] for change in changes])
     return values @ [1.0, -8.0, 8.0, -1.0] / (12 * step), float(abs(values).max())
 
 

@@ -128,19 +128,17 @@ def correct(system: System, x: PETSc.Vec, row: PETSc.Vec, reach: float = FAR, mo
 
 def violation(system: System, x: PETSc.Vec) -> float:
     """Largest entry of the equations at a state, in natural units; zero if that of an equilibrium.  Collective."""
-    equations = system.new_vector()
+    equations, largest = system.new_vector(), PETSc.NormType.INFINITY
     system.at(x).residual(equations)
-    worst = system.in_units(equations, 1).norm(PETSc.NormType.INFINITY)
-    return 0.0 if worst <= VIOLATED or worst <= _round_off(system, x) else worst
-
-
-def _round_off(system: System, x: PETSc.Vec) -> float:
-    """Round-off of the product of the second variation with the state, in natural units."""
+    worst = system.in_units(equations, 1).norm(largest)
+    if worst <= VIOLATED:
+        return 0.0
+    # round-off of the product of the second variation with the state
     matrix = system.state_matrix()
     system.at(x).assemble_into(matrix, system.equations.jacobian)
     matrix.assemble()
-    sizes = system.matrix_in_units(matrix), system.in_units(x, -1)
-    return 1e3 * EPS * float(np.prod([size.norm(PETSc.NormType.INFINITY) for size in sizes]))
+    size = system.matrix_in_units(matrix).norm(largest) * system.in_units(x, -1).norm(largest)
+    return 0.0 if worst <= 1e3 * EPS * size else float(worst)
 
 
 class OnPlane:

@@ -108,12 +108,9 @@ class Resultants:
         equal distances. Strain and curvature jump from element to element, by as much as they are accurate.
         """
         points = self.shape.from_left(self.shape.start[:, None] + self.shape.size[:, None] * self.places)
-        whole = self.table(x)
-        inside, every = _basis(self.nodes[1:-1], self.places), _basis(self.nodes, self.places)
-        strains = np.einsum("pn,enij->epij", inside, whole[:, 1:-1, :2])
-        forces = np.einsum("pn,enij->epij", every, whole[:, :, 2:])
-        values = np.moveaxis(np.concatenate([strains, forces], axis=2), 2, 0)
-        return {"points": points} | dict(zip(NAMES, values, strict=True))
+        elements = np.repeat(np.arange(len(points)), points.shape[1])
+        found = self.on_elements(x, points.ravel(), elements[None])
+        return {"points": points} | {name: getattr(found, name).reshape(*points.shape, 3) for name in NAMES}
 
     def profile(self, x: PETSc.Vec, s: np.ndarray | None = None) -> Profile:
         """Shape, strains, force and moment at the state ``x``, at the nodes or at arclengths ``s`` (m,).

@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 from math import sqrt
 from typing import TYPE_CHECKING
 
@@ -35,7 +34,7 @@ from petsc4py import PETSc
 
 from rodfem.fem.state import LOAD, NodalValues
 from rodfem.forms.symmetry import AXES, Matrix, cross, left, right
-from rodfem.linalg.matrices import times
+from rodfem.linalg.matrices import block_matrix, times
 from rodfem.problem.unknowns import Motion
 
 if TYPE_CHECKING:
@@ -84,21 +83,17 @@ class Symmetry:
 
     def linear(self, fields: Fields) -> sp.csr_matrix:
         """``A`` of the change ``A x + c`` between local degrees of freedom, scalars once."""
-        rows, columns, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
+        size = len(fields.number), len(fields.number)
+        out = self.along * fields.derivative if self.along else sp.csr_matrix(size)
         for target, (matrix, _) in self._targets.items():
             if target in fields.dofs:
                 dofs = np.unique(fields.dofs[target].reshape(-1, len(matrix)), axis=0)
-                places = list(enumerate(dofs.T))
             else:
-                places = [(component, fields.copies[:1, i]) for component, i in _members(fields, target).items()]
-            for (i, row), (j, column) in product(places, places):
-                if matrix[i, j]:
-                    rows.append(row)
-                    columns.append(column)
-                    values.append(np.full(len(row), matrix[i, j]))
-        where = (np.concatenate(rows), np.concatenate(columns))
-        linear = sp.csr_matrix((np.concatenate(values), where), shape=(len(fields.number),) * 2)
-        return linear + self.along * fields.derivative if self.along else linear
+                members = _members(fields, target)
+                dofs, matrix = fields.copies[:1, [*members.values()]], matrix[np.ix_([*members], [*members])]
+            out = out + block_matrix(np.broadcast_to(matrix, (len(dofs), *matrix.shape)), dofs, dofs, size)
+        out.eliminate_zeros()
+        return out
 
     def __str__(self) -> str:
         least = 1e-3 * abs(self.weights).max()  # less of a part is not named
@@ -348,12 +343,8 @@ def _orthogonal(system: System, state: State, gram: np.ndarray) -> tuple[np.ndar
         # by the difference of the vectors: in the Gram matrix half of the digits cancel
         sizes.append(system.norm(system.new_vector(rest @ state.generators)))
         combinations = np.vstack([combinations, rest])
-        least.append(max(10.0 * _jumps(state), 1e-5))  # as SYMMETRIC_STATE, of what is left over
+        # the greatest jump of the derivative between elements: how far the mesh is from the motion along itself
+        worst = float(abs(times(state.fields.derivative_jumps, state.local)).max(initial=0.0))
+        worst = float(state.fields.comm.allreduce(worst, op=MPI.MAX))
+        least.append(max(10.0 * worst, 1e-5))  # as SYMMETRIC_STATE, of what is left over
     return combinations, sizes, least
-
-
-def _jumps(state: State) -> float:
-    """Greatest jump of the derivative between elements: how far the mesh is from the motion along itself."""
-    worst = float(abs(times(state.fields.derivative_jumps, state.local)).max(initial=0.0))
-    comm = state.fields.comm
-    return worst if comm.size == 1 else float(comm.allreduce(worst, op=MPI.MAX))

@@ -12,7 +12,8 @@ the load, and one drift scalar for each symmetry.  The last two kinds are border
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 
@@ -127,6 +128,15 @@ class System:
     def on_mesh(self, mesh: Discretization) -> System:
         """The same rod on another ``mesh``, which does not look for symmetries again."""
         return System(self.scene, mesh, self.comm, self.clock, symmetries=self.symmetries)
+
+    @contextmanager
+    def damped(self, damping: float) -> Iterator[None]:
+        """Let the ``damping`` be another one inside the block."""
+        before, self.damping = self.damping, damping
+        try:
+            yield
+        finally:
+            self.damping = before
 
     # --- vectors -----------------------------------------------------------------------------------------------
 

@@ -12,7 +12,6 @@ from rodfem.fem.state import State
 from rodfem.fem.system import System
 from rodfem.problem.ends import CLOSING_MOMENT
 from rodfem.stability.inertia import NULL, Factored, Inertia
-from rodfem.stability.near_zero import inside_band
 from rodfem.tolerances import same_place
 
 
@@ -27,7 +26,12 @@ class InSpace:
         self.planar = planar
         self.system = System(planar.scene.in_space(), planar.fields.discretization, planar.comm, planar.clock)
         self.inertia = Inertia(self.system)
-        self._out = self._out_of_plane()
+        # places in this rank's part of a vector of the equations that a planar rod does without
+        f, normal = self.system.fields, planar.scene.normal
+        assert normal is not None
+        dofs = [f.dofs["q"][..., [i + 1 for i in range(3) if i != normal]], *f.out_of_plane(normal).values()]
+        places = np.unique(f.number[np.concatenate([d.ravel() for d in dofs])]) - f.offset
+        self._out = places[(places >= 0) & (places < len(f.free_owned))]
 
     def negative(self, x: PETSc.Vec) -> int:
         """Number of negative eigenvalues in space of the planar equilibrium ``x``; raises as :meth:`at` does.
@@ -40,16 +44,10 @@ class InSpace:
         near = index.zero - found.drifts
         if near <= 0:
             return index.negative
-        q = inside_band(found, near, NULL)
-        falling = [
-            value < -error and self._share(v) > 0.5  # mostly out of the plane
-            for value, error, v in zip(q.values, q.uncertainty, q.vectors, strict=True)
-        ]
-        return index.negative + int(sum(falling))
-
-    def _share(self, v: PETSc.Vec) -> float:
-        """Part of the squared norm of a vector of norm 1 that is out of the plane."""
-        return float(self.system.sum(np.sum((v.array_r * (self.inertia.metric * v).array_r)[self._out])))
+        q = found.inside_band(near, NULL)
+        squares = [(v.array_r * (self.inertia.metric * v).array_r)[self._out].sum() for v in q.vectors]
+        falling = (q.values < -q.uncertainty) & (self.system.sum(np.array(squares)) > 0.5)  # mostly out of the plane
+        return index.negative + int(falling.sum())
 
     def at(self, x: PETSc.Vec) -> Factored:
         """Second variation in space at the planar equilibrium ``x``; :class:`SceneError` if that is none in space.
@@ -93,11 +91,3 @@ class InSpace:
             if x.direction is not None and x.group.name in vectors:
                 out[x.name] = float(np.dot(x.direction, vectors[x.group.name]))
         return out
-
-    def _out_of_plane(self) -> np.ndarray:
-        """Places in this rank's part of a vector of the equations that a planar rod does without."""
-        f, normal = self.system.fields, self.planar.scene.normal
-        assert normal is not None
-        dofs = [f.dofs["q"][..., [i + 1 for i in range(3) if i != normal]], *f.out_of_plane(normal).values()]
-        places = np.unique(f.number[np.concatenate([d.ravel() for d in dofs])]) - f.offset
-        return places[(places >= 0) & (places < len(f.free_owned))]

@@ -48,6 +48,10 @@ REGULAR = 1e-5
 """Distance of the nearest eigenvalue from zero, over the lowest bending one, from which on one factorisation serves."""
 DOUBTFUL = 1e-3
 """The same below which what factors tell is sharpened once: solutions, and an estimate of that distance."""
+DECIDED = 1e-3
+"""Relative accuracy of eigenvalues that decide a sign."""
+SPARE = 2
+"""Vectors more than there are eigenvalues in the band."""
 FAR = 0.1
 """Shift of the factors, over the lowest bending eigenvalue, above which they lead to others than those near zero."""
 
@@ -62,6 +66,30 @@ class Index:
     negative: int
     zero: int
     nearest: float = field(default=0.0, compare=False)
+
+
+@dataclass(frozen=True)
+class Quotients:
+    """Rayleigh quotients ``values`` (k,) of ``vectors``, and their ``uncertainty`` (k,) by round-off in the matrix."""
+
+    values: np.ndarray
+    vectors: list[PETSc.Vec]
+    uncertainty: np.ndarray
+
+    @property
+    def negative(self) -> int:
+        """Number of those that are negative."""
+        return int((self.values < -self.uncertainty).sum())
+
+    @property
+    def zero(self) -> int:
+        """Number of those that are zero to working accuracy."""
+        return int((abs(self.values) <= self.uncertainty).sum())
+
+
+def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
+    """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
+    return 10 * rounding(matrix, y, y)
 
 
 class Inertia:
@@ -100,15 +128,12 @@ class Inertia:
         """Assemble ``S`` at an equilibrium ``x``, with its phase conditions."""
         self.system.set_phase(x)
         state = self.system.at(x)
-        if not self._holds(state):
+        held, phase, changes = self._held or (None, None, 0)
+        if not (held is state and phase is self.system.phase and changes == self.matrix.stateGet()):
             self._assemble(x, state)
             self.filled += 1
             self._held = state, self.system.phase, self.matrix.stateGet()
         return Factored(self)
-
-    def _holds(self, state: State) -> bool:
-        held, phase, changes = self._held or (None, None, 0)
-        return held is state and phase is self.system.phase and changes == self.matrix.stateGet()
 
     def images(self, x: PETSc.Vec, own: np.ndarray, *, transposed: bool = False) -> np.ndarray:
         """Products of ``(S F_lam)`` near the last state, at ``x``, or of its transpose, with columns (own rows, k).
@@ -402,6 +427,27 @@ class Factored:
         vectors = images @ z
         residuals = own.sizes(vectors - basis @ z * nu[:size])
         return nu, own.extension(vectors, basis[:, :0], basis[:, :0])[0], residuals
+
+    def quotients(self, vectors: list[PETSc.Vec], least: float) -> Quotients:
+        """Rayleigh quotients of ``vectors`` of metric norm 1; ``least`` is the smallest uncertainty."""
+        values = np.array([v.dot(self.matrix * v).real for v in vectors]) + self.shift
+        return Quotients(values, vectors, np.array([max(quotient_error(self.matrix, v), least) for v in vectors]))
+
+    def inside_band(self, number: int, accuracy: float = DECIDED, least: float = 0.0) -> Quotients:
+        """The ``number`` eigenvalues inside the band of the count, of uncertainty ``least`` at least."""
+        own, (theta, vectors) = self.inertia, self.nearest(number + SPARE, DECIDED)
+        vectors = [vectors[i] for i in np.argsort(abs(theta))]
+        small = int((abs(theta) < 1e-2 * own.scale).sum())  # an accuracy of 1e-3 decides the signs of all others
+        if accuracy < DECIDED and small:
+            vectors[:small] = self.nearest(small, accuracy)[1]
+            own.vectors = list(vectors)
+        out = self.quotients(vectors[:number], least)
+        if (abs(out.values) > 2 * own.tolerance).any():
+            raise ConvergenceError(
+                f"{number} eigenvalues are within round-off of the count, {own.tolerance:.2g} in the metric, and are "
+                "not distinct: take larger elements, or a lower degree."
+            )
+        return out
 
     def noise(self, mode: PETSc.Vec) -> float:
         """Round-off in the eigenvalue of a ``mode`` of metric norm 1: :data:`NOISE` times that of its quotient."""

@@ -24,39 +24,15 @@ from petsc4py import PETSc
 
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
-from rodfem.linalg.matrices import rounding
-from rodfem.stability.inertia import NULL, ROUGH, ZERO_BAND, Factored, Index, Inertia
+from rodfem.stability.inertia import NULL, ROUGH, SPARE, ZERO_BAND, Factored, Index, Inertia, Quotients
 from rodfem.stability.soft_mode import SoftMode
 
 MANY = 100
 """Most eigenvalues near zero that are decided one by one."""
-DECIDED = 1e-3
-"""Relative accuracy of eigenvalues that decide a sign."""
-SPARE = 2
-"""Vectors more than there are eigenvalues in the band."""
 SOFT = 1e-4
 """Eigenvalues nearer to zero than this, over the lowest bending one, are soft; and are solved for to this change."""
 CLEAR = 10.0
 """Times that limit beyond which a rough estimate of the nearest eigenvalue says that none is soft."""
-
-
-@dataclass(frozen=True)
-class Quotients:
-    """Rayleigh quotients ``values`` (k,) of ``vectors``, and their ``uncertainty`` (k,) by round-off in the matrix."""
-
-    values: np.ndarray
-    vectors: list[PETSc.Vec]
-    uncertainty: np.ndarray
-
-    @property
-    def negative(self) -> int:
-        """Number of those that are negative."""
-        return int((self.values < -self.uncertainty).sum())
-
-    @property
-    def zero(self) -> int:
-        """Number of those that are zero to working accuracy."""
-        return int((abs(self.values) <= self.uncertainty).sum())
 
 
 @dataclass(frozen=True)
@@ -91,35 +67,6 @@ class NearZero(Quotients):
         return negative, self.rest + sum(v <= tolerance for v in undecided), len(undecided)
 
 
-def quotient_error(matrix: PETSc.Mat, y: PETSc.Vec) -> float:
-    """Ten times the change of ``y.Sy`` by independent relative errors eps of all entries of S."""
-    return 10 * rounding(matrix, y, y)
-
-
-def quotients(found: Factored, vectors: list[PETSc.Vec], least: float = 0.0) -> Quotients:
-    """Rayleigh quotients of ``vectors`` of metric norm 1 at a state; ``least`` is the smallest uncertainty."""
-    values = np.array([v.dot(found.matrix * v).real for v in vectors]) + found.shift
-    return Quotients(values, vectors, np.array([max(quotient_error(found.matrix, v), least) for v in vectors]))
-
-
-def inside_band(found: Factored, number: int, accuracy: float = DECIDED, least: float = 0.0) -> Quotients:
-    """The ``number`` eigenvalues inside the band of the count at a state, of uncertainty ``least`` at least."""
-    inertia = found.inertia
-    theta, vectors = found.nearest(number + SPARE, DECIDED)
-    vectors = [vectors[i] for i in np.argsort(abs(theta))]
-    small = int((abs(theta) < 1e-2 * inertia.scale).sum())  # an accuracy of 1e-3 decides the signs of all others
-    if accuracy < DECIDED and small:
-        vectors[:small] = found.nearest(small, accuracy)[1]
-        inertia.vectors = list(vectors)
-    out = quotients(found, vectors[:number], least)
-    if (abs(out.values) > 2 * inertia.tolerance).any():
-        raise ConvergenceError(
-            f"{number} eigenvalues are within round-off of the count, {inertia.tolerance:.2g} in the metric, and are "
-            "not distinct: take larger elements, or a lower degree."
-        )
-    return out
-
-
 def decide(found: Factored) -> Decision:
     """Count at a state, and decide eigenvalues within the band by their Rayleigh quotients."""
     index, inertia = found.count(), found.inertia
@@ -136,7 +83,7 @@ def decide(found: Factored) -> Decision:
             f"{inside} eigenvalues are within round-off of the count, {inertia.resolution:.2g} in the metric: the mesh "
             "is too fine for this rod; use fewer elements of a higher degree."
         )
-    q = inside_band(found, inside, least=least)
+    q = found.inside_band(inside, least=least)
     index = replace(index, negative=index.negative + q.negative, zero=q.zero + found.drifts)
     return Decision(index, inertia.tolerance, q.values, q.uncertainty)
 
@@ -146,7 +93,7 @@ def resolve(found: Factored) -> tuple[int, int]:
     index = found.count()
     if (near := index.zero - found.drifts) <= 0:
         return index.negative, index.negative
-    q = inside_band(found, near, NULL)
+    q = found.inside_band(near, NULL)
     return index.negative + q.negative, index.negative + q.negative + q.zero
 
 
@@ -162,7 +109,7 @@ def near_zero(found: Factored, least: int = 0) -> NearZero:
     members = _candidates(found, soft_limit(inertia), inside, least)
     if members is None:
         return NearZero(np.zeros(0), [], np.zeros(0), index.negative, index.zero)
-    q = quotients(found, members, TOLERANCE * inertia.scale)
+    q = found.quotients(members, TOLERANCE * inertia.scale)
     # the count has the nearest ones as zero: next to its tolerance a quotient and the count need not agree
     counted = np.argsort(abs(q.values))[inside:]
     firm = index.negative - int((q.values[counted] < 0).sum())

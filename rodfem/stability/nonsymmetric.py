@@ -27,14 +27,7 @@ from rodfem.linalg.matrices import EPS, gathered, local_rows, rounding_of
 from rodfem.problem.functions import floats
 from rodfem.stability import motion_names
 from rodfem.stability.inertia import NOISE
-from rodfem.stability.pencil import (
-    PencilMatrices,
-    assemble_pencil,
-    exclude_modes,
-    in_units,
-    symmetry_modes,
-    weighed_modes,
-)
+from rodfem.stability.pencil import PencilMatrices, assemble_pencil, exclude_modes, in_units, symmetry_modes
 from rodfem.stability.spectrum import REAL, SHIFT, Eigenpairs, Spectrum, inside, size_of_zero, times
 
 if TYPE_CHECKING:
@@ -177,9 +170,7 @@ class NonsymmetricSolver(PencilMatrices):
         with self.system.clock("assembly"):
             state = assemble_pencil(self.system, x, self.matrix, self.mass)
             free = symmetry_modes(self.system, x)
-            if free:
-                exclude_modes(self.system, free, self.matrix, self.mass)
-            self.free = [mode for mode, _ in weighed_modes(self.system, free, self.mass).values()]
+            self.free = exclude_modes(self.system, free, self.matrix, self.mass) if free else []
         return NonsymmetricPencil(self, state.turned)
 
 

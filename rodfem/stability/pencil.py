@@ -135,20 +135,17 @@ def exclude_modes(system: System, modes: dict[int, PETSc.Vec], matrix: PETSc.Mat
     """Add to a pencil ``matrix``, ``mass`` the constraints ``g.Mx = 0`` for symmetry ``modes`` g, by drift scalars.
 
     ``g`` being an eigenvector of ``mu = 0``, the rest of the spectrum is unchanged, and the inertia counts it.  Returns
-    the modes that have mass, orthonormal in it: a Krylov space of the ``system`` is deflated by them, too, or round-off
-    adds them if ``mu`` is large.
+    the basis of the modes of :func:`weighed_modes`.
     """
-    deflated = []
-    for index, (mode, image) in weighed_modes(system, modes, mass).items():
-        if abs(mode.dot(mass * mode) - 1.0) < 0.5:
-            deflated.append(mode)
+    found = weighed_modes(system, modes, mass)
+    for index, (_, image) in found.items():
         own = np.arange(*image.getOwnershipRange(), dtype=PETSc.IntType)
         if system.has_scalars:
             matrix.setValue(index, index, -_one(system, index), addv=True)
         matrix.setValues([index], own, image.array_r, addv=True)
         matrix.setValues(own, [index], image.array_r, addv=True)
     matrix.assemble()
-    return deflated
+    return [mode for mode, _ in found.values()]
 
 
 @dataclass(frozen=True)

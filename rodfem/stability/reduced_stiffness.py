@@ -31,8 +31,7 @@ from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import bordered, local_rows, matrix_of, times
-from rodfem.stability.inertia import DOUBTFUL, Inertia
-from rodfem.stability.near_zero import quotient_error
+from rodfem.stability.inertia import DOUBTFUL, Inertia, quotient_error
 
 NEARLY_ZERO = 1e-6
 """Eigenvalue of H, over the lowest bending one, below which it may be round-off."""

@@ -79,7 +79,9 @@ class SymmetricSolver(PencilMatrices):
         with system.clock("assembly"):
             modes = symmetry_modes(system, x)
             assemble_pencil(system, x, self.matrix, self.mass)
-            self.deflated = exclude_modes(system, modes, self.matrix, self.mass)
+            free = exclude_modes(system, modes, self.matrix, self.mass)
+            # a Krylov space is deflated by those that have mass, too, or round-off adds them if ``mu`` is large
+            self.deflated = [mode for mode in free if abs(mode.dot(self.mass * mode) - 1.0) < 0.5]
             self.scaled = in_units(system, self.matrix, self.mass, self.sizes)
             if not system.scene.units.ordinary:
                 for mode in self.deflated:

@@ -83,11 +83,12 @@ def test_solvers_that_share_forms_take_turns() -> None:
     points = [solver.equilibrium(0.3) for solver in (one, other, alone)]
     forces = [s.equilibria.resultants.at(p.x)["moment"] for s, p in zip((one, other, alone), points, strict=True)]
     np.testing.assert_array_equal(forces[1], forces[2])
-    assert one.equilibria.energies(points[0].x) != other.equilibria.energies(points[1].x)
-    one.equilibria.energy(points[0].x)
+    at = [s.equilibria.system.at for s in (one, other, alone)]
+    assert at[0](points[0].x).energies() != at[1](points[1].x).energies()
+    at[0](points[0].x).energy()
     again = other.equilibria.resultants.at(points[1].x)["moment"]  # its values were there, and its constants are not
     np.testing.assert_array_equal(again, forces[2])
-    assert other.equilibria.energies(points[1].x) == alone.equilibria.energies(points[2].x)
+    assert at[1](points[1].x).energies() == at[2](points[2].x).energies()
 
 
 def test_a_constant_that_asks_for_other_unknowns() -> None:

@@ -82,7 +82,7 @@ def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> 
     y = x.copy()
     given.system.set_load(y, 0.2)  # d = 0.15 + 0.25 * 0.2 = 0.2
     assert given.shape.ordinate(y) == pytest.approx(expected.shape.ordinate(x), abs=1e-14)
-    assert given.energy(y) == pytest.approx(expected.energy(x), rel=1e-14)
+    assert given.system.at(y).energy() == pytest.approx(expected.system.at(x).energy(), rel=1e-14)
     ours, theirs = given.system.new_vector(), expected.system.new_vector()
     given.system.at(y).residual(ours)
     expected.system.at(x).residual(theirs)

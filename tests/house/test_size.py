@@ -12,8 +12,8 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 31913,
-    "files of Python": 148,
+    "lines of Python": 31787,
+    "files of Python": 147,
     "lines of C": 1026,
     "module constants with a number": 248,
     "functions of a complexity above 10": 0,

@@ -1,5 +1,6 @@
 """Round-off of eigenvalues: of a quadratic form entry by entry, in wide bands, at states far from the rod's."""
 
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,8 +16,8 @@ from rodfem import Attachment, ConvergenceError, Discretization, Scene, Solver, 
 from rodfem.continuation.first_equilibrium import examined, first_equilibrium, is_stable
 from rodfem.fem.newton import NewtonResult
 from rodfem.linalg.matrices import rounding
-from rodfem.stability.inertia import Index
-from rodfem.stability.near_zero import decide, quotient_error, resolve
+from rodfem.stability.inertia import Factored, Index, quotient_error
+from rodfem.stability.near_zero import decide, resolve
 
 EPS = np.finfo(float).eps
 
@@ -55,6 +56,7 @@ def test_zeros_of_symmetries_stay_zeros() -> None:
         count=lambda: Index(2, 3), drifts=1, inertia=inertia, shift=0.0, matrix=matrix,
         nearest=lambda number, accuracy: (theta, vectors),
     )  # fmt: skip
+    found.quotients, found.inside_band = (partial(f, found) for f in (Factored.quotients, Factored.inside_band))
     index = decide(found).index
     assert (index.negative, index.zero) == (3, 1)
 
