@@ -59,12 +59,8 @@ class Smoothness:
 
     def fulfilled_by(self, mesh: Discretization, vertices: np.ndarray, indicator: float) -> bool:
         """Whether elements with these vertices are nowhere larger than the indicator allows."""
-        sizes = self.sizes(mesh.degree, indicator)
-        for a, b in pairwise(vertices):
-            over = (self.vertices[:-1] < b) & (self.vertices[1:] > a)
-            if b - a > 1.05 * sizes[over].min():
-                return False
-        return True
+        sizes, (starts, ends) = self.sizes(mesh.degree, indicator), (self.vertices[:-1], self.vertices[1:])
+        return all(b - a <= 1.05 * sizes[(starts < b) & (ends > a)].min() for a, b in pairwise(vertices))
 
 
 class SmoothnessIndicator:
@@ -174,18 +170,13 @@ def cost(fields: Fields, elements: int, degree: int) -> float:
 
 def cheapest(solver: BranchSolver, found: Smoothness, indicator: float) -> Discretization:
     """Cheapest discretisation with which the indicator of a state falls to that value: degree, number, vertices."""
-    fields = solver.system.fields
+    fields, made = solver.system.fields, list[Discretization]()
     present = fields.discretization
-    best: tuple[float, Discretization] | None = None
     for degree in sorted({*range(4, 11), present.degree}):
-        vertices = _place(fields, found, found.sizes(degree, indicator))
-        # forms of another degree have to be compiled or loaded
-        effort = cost(fields, len(vertices) - 1, degree) * (1.0 if degree == present.degree else 1.15)
-        if best is None or effort < best[0]:
-            mesh = replace(present, elements=len(vertices) - 1, degree=degree, vertices=tuple(map(float, vertices)))
-            best = effort, mesh
-    assert best is not None
-    return best[1]
+        vertices = tuple(map(float, _place(fields, found, found.sizes(degree, indicator))))
+        made.append(replace(present, elements=len(vertices) - 1, degree=degree, vertices=vertices))
+    # forms of another degree have to be compiled or loaded
+    return min(made, key=lambda d: cost(fields, d.elements, d.degree) * (1.0 if d.degree == present.degree else 1.15))
 
 
 def _place(fields: Fields, found: Smoothness, sizes: np.ndarray) -> np.ndarray:

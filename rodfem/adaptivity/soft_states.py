@@ -194,10 +194,8 @@ class SoftStates:
             # a sign that is another one than the mesh's own is not decided there
             contrary, away = np.sign(values) != np.sign(coarse), abs(values - coarse)
             bars = np.where(away > abs(coarse), left + away, left)
-            out = [
-                replace(m, value=v, uncertainty=u)
-                for m, v, u in zip(modes, values.tolist(), bars.tolist(), strict=True)
-            ]
+            found = zip(modes, values.tolist(), bars.tolist(), strict=True)
+            out = [replace(m, value=value, uncertainty=bar) for m, value, bar in found]
             # no richer mesh decides what is within round-off wherever the error of the mesh may move it
             if ((abs(values) > bars) | lost).all() or (contrary & (left < abs(values))).any():
                 break
@@ -377,9 +375,9 @@ def _bounds(rows: Sequence[Point]) -> tuple[float, float]:
 
 def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:
     """Give a simple fold, where a count has one index on both sides, those of the nearest ``rows`` decided."""
-    here, decided = fold.point.arclength, [p for p in rows if not p.undecided]
-    both = [p.negative for p in decided if p.arclength < here][-1:] + [
-        p.negative for p in decided if p.arclength > here
-    ][:1]
+    here = fold.point.arclength
+    decided = [p for p in rows if not p.undecided and p.arclength != here]
+    after = sum(p.arclength < here for p in decided)
+    both = [p.negative for p in decided[max(after - 1, 0) : after + 1]]
     if fold.negative_before == fold.negative_after and len(both) == 2 and abs(both[0] - both[1]) == 1:
         fold.negative_before, fold.negative_after = both

@@ -205,8 +205,8 @@ class Chord(ABC):
         self.row, self.origin = self.solver.row(self.chord), a.x
 
     @abstractmethod
-    def node(self, x: PETSc.Vec, tangent: PETSc.Vec) -> Node:
-        """Node at a state with its unit tangent."""
+    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, known: Any = None) -> Node:
+        """Node at a state with its unit tangent; what it is made of may be ``known``."""
 
     def place(self, x: PETSc.Vec) -> float:
         """Where a state is."""
@@ -253,9 +253,9 @@ class Piece(Chord):
         """Number of amplitudes that were left out."""
         return self.moving.shape[0] - self.moving.shape[1]
 
-    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, reduced: ReducedStiffness | None = None) -> Node:
-        """Node at a state with its unit tangent; its reduced stiffness may be known."""
-        reduced = reduced or self.condensation.at(x, tangent, self.phi)
+    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, known: ReducedStiffness | None = None) -> Node:
+        """Node at a state with its unit tangent; its reduced stiffness may be ``known``."""
+        reduced = known or self.condensation.at(x, tangent, self.phi)
         speed, Q = float(self.row.dot(tangent)), self.moving
         knot = Knot(x, tangent * (1.0 / speed), speed, reduced)
         return Node(self.place(x), Q.T @ reduced.H @ Q, Q.T @ reduced.rate @ Q / speed, reduced.far, knot)
@@ -302,10 +302,6 @@ class SoughtPiece(Chord):
         self.first, self.last = (self.node(end.x, end.tangent, end.samples) for end in (a, b))
 
     @abstractmethod
-    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, seen: Any = None) -> Node:
-        """Node at a state with its unit tangent; what events receive there may have been ``seen``."""
-
-    @abstractmethod
     def zeros(self) -> list[Node]:
         """Nodes at which it happens, in order; raises :class:`ConvergenceError` where an equilibrium is not found."""
 
@@ -343,9 +339,9 @@ class EventPiece(SoughtPiece):
         varied = (abs(self._change(p, x.samples[-1])) for p, x in ((self.first, a), (self.last, b)))
         self.level = ROUND_OFF / GENERIC * max(varied)
 
-    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, seen: list[dict[str, Any]] | None = None) -> Node:
-        """Node at a state with its unit tangent; what the number receives there may have been ``seen``."""
-        here, ahead, behind, *_ = seen or end(self.solver, 0.0, x, tangent).samples
+    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, known: list[dict[str, Any]] | None = None) -> Node:
+        """Node at a state with its unit tangent; what the number receives there may be ``known``."""
+        here, ahead, behind, *_ = known or end(self.solver, 0.0, x, tangent).samples
         speed = float(self.row.dot(tangent))
         node = _number(self.place(x), self.event(here), 0.0)
         slope = (self._change(node, ahead) - self._change(node, behind)) / (2 * DIFFERENCE * speed)
@@ -420,7 +416,7 @@ class LevelPiece(SoughtPiece):
 
     kind = LEVEL
 
-    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, seen: Any = None) -> Node:
+    def node(self, x: PETSc.Vec, tangent: PETSc.Vec, known: Any = None) -> Node:
         """Node at a state with its unit tangent."""
         below = self.solver.spectrum.at(x).eigenvalue_count(self.event.value / self.solver.units.omega2)
         speed, none = float(self.row.dot(tangent)), np.zeros((0, 0))

@@ -80,11 +80,7 @@ class Point:
 
         None where :attr:`undecided` ones may be, and no other is, on a kink, and if a richer mesh has no such state.
         """
-        return is_stable(self._stability)
-
-    @property
-    def _stability(self) -> str:
-        return stability(self.negative, self.undecided, self.kink or self.uncompared, self.negative_in_space)
+        return is_stable(stability(self.negative, self.undecided, self.kink or self.uncompared, self.negative_in_space))
 
     def profile(self, s: Sequence[float] | np.ndarray | None = None) -> Profile:
         """Shape, strains, contact force and moment at arclengths ``s`` (m,), by default at the nodes; collective.

@@ -295,9 +295,8 @@ class CriticalLoads:
         """Divergence of as many eigenvalues as ``loads``, where their mean, which is smooth, is zero."""
         at, number = self._side(a, loads[0]), len(loads)
         places = np.argsort(abs(at.spectrum.values), kind="stable")[: number + self._zeros]
-        cluster = cluster_at(
-            self.eigensolver.at(at.x), at.spectrum, places[at.spectrum.values[places].imag >= 0.0].tolist()
-        )
+        own = places[at.spectrum.values[places].imag >= 0.0].tolist()
+        cluster = cluster_at(self.eigensolver.at(at.x), at.spectrum, own)
         mean = Mean(Measuring(self.solver, self.eigensolver, a.x), cluster, self._zeros)
         load, uncertainty = interpolated_zero(mean, mean.noise, loads[0], self.units.load)
         uncertainty = max(uncertainty, abs(loads[-1] - loads[0]), SHARP * unit(load, one=self.units.load))

@@ -90,15 +90,9 @@ class Events:
 
     def finish(self, observer: Observer) -> None:
         """Say where an event was not located, and where it is zero all along."""
-        words = (
-            (self._open, observer.warn, "The event {!r} was not located between loads {:.8g} and {:.8g}: {}."),
-            (
-                self._flat,
-                observer.note,
-                "  the event {!r} is zero all along between loads {:.8g} and {:.8g}: no special points",
-            ),
-        )
-        for found, say, sentence in words:
+        lost = "The event {!r} was not located between loads {:.8g} and {:.8g}: {}."
+        flat = "  the event {!r} is zero all along between loads {:.8g} and {:.8g}: no special points"
+        for found, say, sentence in ((self._open, observer.warn, lost), (self._flat, observer.note, flat)):
             for name, loads in found.items():
                 say(Remark(sentence.format(name, min(loads), max(loads), SMALLER_STEPS), *loads))
         self._open, self._flat, self._last = {}, {}, None

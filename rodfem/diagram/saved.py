@@ -51,10 +51,9 @@ def load(folder: Path | str, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> D
         branches = [_branch(entry, solvers, states) for entry in data["branches"]]
         asked = data["asked"]
         diagram = Diagram(scene, replace(plan_without(asked), span=tuple(data["range"])), branches, solvers)
-        diagram.warnings, diagram.notes = (
-            [Remark(e["sentence"], *e["loads"] or (), branch=e["branch"]) for e in data[x]]
-            for x in ("warnings", "notes")
-        )
+        said = data["warnings"], data["notes"]
+        remarks = ([Remark(e["sentence"], *e["loads"] or (), branch=e["branch"]) for e in entries] for entries in said)
+        diagram.warnings, diagram.notes = remarks
         diagram.asked, diagram.lacks, diagram.complete = asked, not_held(asked), data["complete"]
     return diagram
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
+from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -41,14 +41,8 @@ STATE: Check = a((Point, SpecialPoint, PETSc.Vec), "a point of a branch or a vec
 METHOD: Check = text("auto")  # checks of arguments that several functions have
 
 
-def _sensitivity() -> Any:
-    """Module of the derivatives of points: it stands above them, and is loaded when one is asked for."""
-    from rodfem.codim2 import sensitivity
-
-    return sensitivity
-
-
-Point.sensitivity = staticmethod(_sensitivity)
+# the derivatives of points stand above them, and are loaded when one is asked for
+Point.sensitivity = staticmethod(partial(import_module, "rodfem.codim2.sensitivity"))
 
 
 class Solver:

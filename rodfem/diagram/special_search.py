@@ -168,9 +168,8 @@ class SpecialSearch:
             if p.far == q.far and max(n.kept.reduced.rotated for n in (p, q)) < ROTATED:
                 break
             self._nearest = -inf
-            piece, p, q = self._ends(
-                a, b, self._border(self._condensation(b.mesh).border(self._changing(piece, p, q, halvings)))
-            )
+            x = self._changing(piece, p, q, halvings)
+            piece, p, q = self._ends(a, b, self._border(self._condensation(b.mesh).border(x)))
         first, zeros = p.kept.reduced, min(n.kept.reduced.zero for n in (p, q))
         if zeros:
             values, vectors = np.linalg.eigh(first.H)

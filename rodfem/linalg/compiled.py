@@ -85,7 +85,11 @@ def addresses(compiled: Any, *names: str) -> list[int]:
 @cache
 def module(name: str) -> Any:
     """The compiled module of the file ``name.c`` in the package, with ``lib`` and ``ffi`` of cffi."""
-    full, found = _full_name(name), _library(name)
+    full = _full_name(name)
+    # next to its code, from the wheel, or in the cache: to list that takes long, it has many files
+    places = ((PACKAGE / name).parent, code_cache.folder())
+    files = (place / f"{full}{suffix}" for place in places for suffix in EXTENSION_SUFFIXES)
+    found = next((file for file in files if file.is_file()), None)
     out = (code_cache.load(full, found) if found else None) or code_cache.load(full, _compile(name))
     if out is None:
         raise SetupError(code_cache.UNLOADABLE.format(code_cache.folder()))
@@ -118,14 +122,6 @@ def _full_name(name: str) -> str:
     depends = [_code(name), *FLAGS, *LINKED, sys.version, code_cache.processor()]
     key = hashlib.sha1("\n".join(depends).encode()).hexdigest()[:16]
     return f"rodfem_{Path(name).name}_{key}"
-
-
-def _library(name: str) -> Path | None:
-    """Compiled module next to its code, from the wheel, or in the cache: to list that takes long, it has many files."""
-    full = _full_name(name)
-    places = ((PACKAGE / name).parent, code_cache.folder())
-    files = (place / f"{full}{suffix}" for place in places for suffix in EXTENSION_SUFFIXES)
-    return next((file for file in files if file.is_file()), None)
 
 
 def _compile(name: str) -> Path:

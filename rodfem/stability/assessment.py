@@ -332,9 +332,7 @@ class Slicing(SymmetricMethod):
         values, vectors = pencil.converged(solver, number)
         solver.destroy()
         errors = pencil.backward_errors(values, vectors)
-        return Eigenvalues(
-            self.work.one * values, pencil.unscaled(vectors), errors, complete, 3
-        )  # SLEPc's own, at least
+        return Eigenvalues(self.work.one * values, pencil.unscaled(vectors), errors, complete, 3)  # SLEPc's, at least
 
 
 def sliced(pencil: SymmetricSolver, low: float, high: float) -> SLEPc.EPS | None:
