@@ -67,7 +67,6 @@ class Design:
         return np.asarray(self.fields[name].table(t) @ self.numbers[name])
 
     def __repr__(self) -> str:
-        """Load and how it was reached."""
         return f"<Design: first loss at {self.load:.8g}, {self.message}>"
 
 

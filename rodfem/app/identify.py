@@ -60,7 +60,6 @@ class Identified:
     points: list[Point]
 
     def __repr__(self) -> str:
-        """Each constant with its standard error."""
         each = ", ".join(f"{name} = {number(value, self.errors[name])}" for name, value in self.values.items())
         return f"<Identified: {each}>"
 
@@ -101,7 +100,6 @@ def identify(
 
 
 def _chosen(fields: Mapping[str, Field]) -> list[str]:
-    """Names of the numbers of all fields."""
     return [n for name, field in fields.items() for n in names(name, field)]
 
 
@@ -243,7 +241,6 @@ class _Model:
         return out
 
     def _of(self, kind: str, table: np.ndarray) -> Rows:
-        """Residuals of a table, and their derivatives."""
         if self._critical is not None and kind == CRITICAL:
             loads, slopes = self._critical.loads(self.chosen, np.array([self._values[n] for n in self.chosen]))
             return loads - table[:, 0], slopes

@@ -392,7 +392,6 @@ class Statement:
 
 
 def _constant(owner: str, argument: Parameter, described: Mapping[str, str]) -> Constant:
-    """Constant of an argument of the function ``owner``."""
     name, default = argument.name, argument.default
     if default is Parameter.empty:
         raise InputError(f"The argument {name} of {owner} has no default: give it one, which an option can replace.")

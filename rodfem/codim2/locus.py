@@ -118,7 +118,6 @@ class Locus:
         }
 
     def _of_scene(self) -> dict[str, Any]:
-        """What a file says of the scene."""
         scene = self.system.scene
         own = [scene.parameters[name] for name in self.names]
         return {

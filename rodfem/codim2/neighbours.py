@@ -235,7 +235,6 @@ class Rods:
         return bound(found.load, again.load, left, rho)
 
     def _data(self, found: Sequence[SingularState], bars: Sequence[float]) -> Iterator[dict[str, Any]]:
-        """What a family has of the special points."""
         for special, x, bar in zip(self.special, found, bars, strict=True):
             ordinate, index = self.solver.shape.ordinate(x.x), (special.negative_before, special.negative_after)
             numbers = x.load, bar if self.richer else None, ordinate, *index

@@ -184,7 +184,6 @@ class Codim2Points:
         return found
 
     def _parts(self, a: LocusPoint, b: LocusPoint) -> list[LocusPoint]:
-        """Points that part a step."""
         found = list[LocusPoint]()
         for share in np.arange(1, PARTS) / PARTS:
             with suppress(ConvergenceError):

@@ -18,15 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from rodfem.continuation.branch import COLUMNS, Branch
+from rodfem.continuation.branch import COLUMNS, Branch, Point
 from rodfem.errors import InputError
 from rodfem.file_format import DIAGRAM, STATES, read_json
 from rodfem.libraries import optional
 from rodfem.modes.modes import load_modes, rows_with_modes, stacked
-from rodfem.output.table import reactions_by_name
+from rodfem.output.table import point_values, reactions_by_name
 from rodfem.output.words import row_of
 from rodfem.problem.quaternions import directors
-from rodfem.stability.soft_mode import is_stable, stability
 from rodfem.tolerances import same_place
 from rodfem.whole_files import with_added, write_whole
 
@@ -250,51 +249,39 @@ def as_csv(rows: list[dict[str, Any]]) -> bytes:
 
 def to_netcdf(folder: Path, target: Path) -> list[Path]:
     """Write ``diagram.nc``, the content of :meth:`rodfem.Diagram.to_xarray`; returns the file."""
-    data, every = read_json(folder / "diagram.json", DIAGRAM, ("branches", "constants")), list(rows_of(folder))
-    fields = []
-    for rows in every:
+    data, fields = read_json(folder / "diagram.json", DIAGRAM, ("branches", "constants")), []
+    for rows in rows_of(folder):
         for row in range(len(rows.columns["load"])):
             here = {name: values[row] for name, values in rows.fields.items()}
             frames = np.stack([here[f"d{i + 1}"] for i in range(3)], axis=1)
             fields.append(here | {name: here[symbol] for symbol, name in PROFILES.items()} | {"directors": frames})
-    columns = {rows.name: _columns(rows, b["columns"]) for rows, b in zip(every, data["branches"], strict=True)}
-    path = target / "diagram.nc"
-    write_whole({path: bytes(_dataset(data, columns, fields).to_netcdf())})
+    branches, path = list(map(_without_states, data["branches"])), target / "diagram.nc"
+    write_whole({path: bytes(_dataset(data, branches, fields).astype(float).to_netcdf())})
     return [path]
 
 
-def _columns(rows: Rows, columns: Mapping[str, Any]) -> dict[str, Floats]:
-    """Columns of a branch in files, nan where there is none; files leave out what is decided all along."""
-    none = [None] * len(rows.columns["load"])
-    parts = [columns.get(name) or none for name in ("negative", "undecided", "kink", "uncompared", "negative_in_space")]
-    stable = [
-        is_stable(stability(negative, undecided or 0, kink or uncompared or "", in_space))
-        for negative, undecided, kink, uncompared, in_space in zip(*parts, strict=True)
-    ]
-    known = {"undecided": np.zeros(len(none))} | rows.columns
-    known["stable"] = np.array(stable, dtype=float)
-    return {name: known.get(name, np.full(len(none), np.nan)) for name in COLUMNS}
+def _without_states(data: Mapping[str, Any]) -> Branch:
+    """A branch of a file, whose points have what is in its columns, and no state."""
+    values = [point_values(data["columns"], row) for row in range(len(data["columns"]["load"]))]
+    return Branch(data["name"], None, 0, [Point(x=None, tangent=None, **known) for known in values])
 
 
 def dataset_of(branches: Sequence[Branch], data: Mapping[str, Any]) -> Any:
     """A Dataset of xarray, of branches and of the ``data`` that their ``diagram.json`` has."""
     fields = [{name: getattr(p, name) for name in ("s", *VECTORS)} for b in branches for p in b.points]
-    return _dataset(data, {b.name: {name: b[name] for name in COLUMNS} for b in branches}, fields)
+    return _dataset(data, branches, fields)
 
 
-def _dataset(
-    data: Mapping[str, Any], branches: Mapping[str, Mapping[str, Floats]], fields: Sequence[Mapping[str, Floats]]
-) -> Any:
-    """Columns of branches by name, and fields of each row at the nodes; those of a coarser mesh end in nan."""
-    columns: dict[str, Any] = {n: ("point", np.concatenate([b[n] for b in branches.values()])) for n in COLUMNS}
+def _dataset(data: Mapping[str, Any], branches: Sequence[Branch], fields: Sequence[Mapping[str, Floats]]) -> Any:
+    """Columns of branches, and fields of each row at the nodes; those of a coarser mesh end in nan."""
+    columns: dict[str, Any] = {n: ("point", np.concatenate([b[n] for b in branches])) for n in COLUMNS}
     columns["s"] = ("point", "node"), stacked([here["s"] for here in fields])
     for name, words in VECTORS.items():
         values = stacked([here[name] for here in fields])
         columns[name] = ("point", "node", *("director", "component")[4 - values.ndim :]), values, {"long_name": words}
-    sizes = [len(b["load"]) for b in branches.values()]
+    names, rows = zip(*((b.name, row) for b in branches for row in range(len(b.points))), strict=True)
     coordinates = {name: columns.pop(name) for name in ("load", "arclength", "s")}
-    coordinates["branch"] = "point", np.repeat([*branches], sizes)
-    coordinates["row"] = "point", np.concatenate([np.arange(size) for size in sizes])
+    coordinates |= {"branch": ("point", np.array(names)), "row": ("point", np.array(rows))}
     out = optional("xarray", "tables").Dataset(columns, coordinates, {"scene": data["scene"]} | data["constants"])
     out["load"].attrs |= {"long_name": data["parameter_words"] or data["parameter"], "units": data["parameter_unit"]}
     out["ordinate"].attrs |= {"long_name": data["ordinate"], "units": data["ordinate_unit"]}

@@ -351,7 +351,6 @@ def _load(data: Data) -> str:
 
 
 def _width(data: Data) -> float:
-    """Width of the range of the load."""
     low, high = data["range"]
     return float(abs(high - low))
 

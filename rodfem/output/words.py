@@ -251,7 +251,6 @@ def words_of(branch: Data, *, planar: bool = False, leaves: str = "") -> list[Wo
 
 
 def _doubts(branch: Data) -> dict[int, list[str]]:
-    """Doubts by rows."""
     out = defaultdict(list)
     for change in branch.get("unexplained") or ():
         for row in (change["row"], change["row"] + 1):

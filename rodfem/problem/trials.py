@@ -139,7 +139,6 @@ class _Trial:
             yield from ((*_pair(e, x), there) for e, x in zip(expressions, numbers, strict=True))
 
     def _constants(self) -> Iterator[Constants]:
-        """Constants at which the function is tried."""
         scene = self.scene
         s = inside(scene.interval)[0] if self.s is None and self.of_place else self.s
         yield from (scene.constants(load, s) for load in (None, *scene.loads()))

@@ -118,7 +118,6 @@ def _clear(values: Iterable[Any], size: float) -> list[float | None]:
 
 
 def _derived(shapes: Shapes) -> dict[str, list[float | None]]:
-    """Values of :data:`DERIVED`."""
     length = shapes.s[-1] - shapes.s[0]
     ends = np.linalg.norm(shapes.r[:, -1] - shapes.r[:, 0], axis=1)
     turns = [writhe(CubicSpline(shapes.s, r), (shapes.s[0], shapes.s[-1])) for r in shapes.r]
