@@ -110,7 +110,7 @@ for P in (10.0, 22.0):
 # ## Number
 #
 # Separate variables in $w'''' + P w'' = \mu w$. With $\omega^2 = \mu$,
-# $\alpha^2, \beta^2 = \sqrt{P^2/4 + \omega^2} \pm P/2$ the frequencies are the zeros of $g$ below, and they collide
+# $\alpha^2, \beta^2 = \sqrt{P^2/4 + \omega^2} \mp P/2$ the frequencies are the zeros of $g$ below, and they collide
 # where $\partial g/\partial\omega = 0$ too: at $P = 20.0509536$ (Beck 1952), more than eight times Euler's $\pi^2/4$.
 # Ziegler's pendulum flutters from $P = 7/2 - \sqrt 2$ on.
 
@@ -119,8 +119,8 @@ from scipy.optimize import fsolve
 
 
 def g(omega, P):
-    a, b = (np.sqrt(np.sqrt(P * P / 4 + omega * omega) + sign * P / 2) for sign in (1, -1))
-    return P * P + 2 * omega**2 * (1 + np.cos(a) * np.cosh(b)) + P * omega * np.sin(a) * np.sinh(b)
+    a, b = (np.sqrt(np.sqrt(P * P / 4 + omega * omega) + sign * P / 2) for sign in (-1, 1))
+    return P * P + 2 * omega**2 * (1 + np.cosh(a) * np.cos(b)) + P * omega * np.sinh(a) * np.sin(b)
 
 
 h = 1e-20  # derivative by a complex step

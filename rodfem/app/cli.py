@@ -66,7 +66,7 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print ``message``, of an unknown option with the nearest one there is, and leave with status 2."""
         unknown = re.findall(r"(?<!\S)--[\w-]+", message.partition("unrecognized")[2])
-        if near := [x for word in unknown for x in get_close_matches(word, self._option_string_actions, 1, 0.7)]:
+        if near := [x for word in unknown for x in get_close_matches(word, self._option_string_actions, 1, 0.65)]:
             message += f" (did you mean {', '.join(near)}?)"
         complain(f"{message[:1].upper()}{message[1:]}; see {self.prog} --help.")
 

@@ -51,6 +51,7 @@ LINES = {
     "--output ''": "name of the folder is empty",
     "--output /etc/passwd/x": "cannot be written",
     "--foo": "Unrecognized arguments: --foo; see",
+    "--lenght 2": "--lenght 2 .did you mean --half-length[?]",
     "--cuopling -2 --elemnts 4": "--elemnts 4 .did you mean --coupling, --elements[?]",
 }
 AFTER_SET_UP = ("--half-length 1e3", "--bending 1e-5")
