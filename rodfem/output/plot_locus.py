@@ -76,19 +76,19 @@ def _draw_curve(axes: Axes, one: Locus, loci: Sequence[Locus]) -> None:
 
 
 def _write_indices(axes: Axes, one: Locus) -> None:
-    """Write the indices on both sides of a curve, away from its start: after three tenths of its rows."""
-    row = round(0.3 * (len(one["columns"]["index"]) - 1))
-    low, high = one["columns"]["index"][row]
-    if low < 0:
-        return
+    """Write the indices on both sides of a curve, within its middle half and as far as may be from its marks."""
     rows = np.column_stack(_curve(one))
-    places = axes.transData.transform(rows)
+    places, edge = axes.transData.transform(rows), len(rows) // 4
+    apart = np.linalg.norm(places[:, None] - places[[one["start"], *(m["row"] for m in one["marks"])]], axis=2)
+    row = edge + int(apart.min(axis=1)[edge : len(rows) - edge].argmax())
+    if (index := one["columns"]["index"][row])[0] < 0:
+        return
     tangent = places[min(row + 1, len(places) - 1)] - places[max(row - 1, 0)]
     normal = np.array([-tangent[1], tangent[0]]) / max(np.hypot(*tangent), TINY)
     away = np.array([16.5, 11.0]) * normal * (-1.0 if normal[1] < 0.0 else 1.0)  # in points
     look = {"weight": "bold", "ha": "center", "va": "center", "zorder": 6, "path_effects": HALO}
     colour = LINES[one["kind"]][0]
-    axes.annotate(f"{low}|{high}", tuple(rows[row]), away, textcoords="offset points", color=colour, **look)
+    axes.annotate("{}|{}".format(*index), tuple(rows[row]), away, textcoords="offset points", color=colour, **look)
 
 
 def _subtitle(loci: Sequence[Locus]) -> str:

@@ -65,7 +65,7 @@ def sheet(title: str, about: str, given: Axes | None = None) -> tuple[Figure, Ax
     figure = Sheet(figsize=SIZE, dpi=DPI, layout="constrained")
     axes = figure.add_subplot(axisbelow=True)
     figure.suptitle(tex(title), fontsize=FONT + 2, wrap=True)
-    axes.set_title(about, color="0.4", fontsize=FONT - 3, wrap=True)
+    axes.set_title(about.replace("; ", "\n") if len(about) > 110 else about, color="0.4", fontsize=FONT - 3)
     return figure, axes
 
 

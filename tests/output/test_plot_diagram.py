@@ -23,7 +23,7 @@ from rodfem.output.plot_diagram import (
     figure_of,
 )
 from rodfem.output.plot_locus import draw_locus
-from rodfem.output.style import PALETTE
+from rodfem.output.style import PALETTE, sheet
 
 
 def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
@@ -143,6 +143,17 @@ def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypat
     assert [region.get_paths()[0].contains_point(place) for place in places] == [True, False, False, True, False]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("$A$", "force $P$")
     assert axes.get_legend().get_window_extent().y1 < axes.xaxis.label.get_window_extent().y0
+    starts = {(1.0, 2.0), (0.5, 0.5)}
+    assert len(axes.texts) == 2 and starts.isdisjoint(tuple(text.xy) for text in axes.texts)  # no label on a mark
+
+
+def test_a_long_subtitle_stays_below_the_title() -> None:
+    figure, axes = sheet(
+        "by hand", "; ".join(["more than seventy letters of what a picture was computed with, and how accurately"] * 2)
+    )
+    figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
+    title, below = (text.get_window_extent() for text in (figure._suptitle, axes.title))  # type: ignore[attr-defined]
+    assert title.y0 > below.y1 and below.x0 > 0 and below.x1 < figure.bbox.x1
 
 
 # --- curves between rows
