@@ -27,7 +27,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.solver import SCENE, Solver
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.fields import Discretization
-from rodfem.fem.state import line
+from rodfem.fem.state import load_line
 from rodfem.output.words import number
 from rodfem.problem.arguments import Check, checked, each
 from rodfem.problem.field import Field, names, with_fields
@@ -233,7 +233,7 @@ class _Model:
     def _moved(self, states: Mapping[float, PETSc.Vec], values: Values) -> dict[float, PETSc.Vec]:
         """States at their loads with other constants."""
         equilibria, out = self.solver.equilibria, {}
-        equilibria.system.line = line(self.scene, {**values, self.scene.load: 0.0}, {self.scene.load: 1.0})
+        equilibria.system.line = load_line(self.scene, **values)
         for load, x in states.items():
             out[load], outcome = equilibria.at_load(x, load)
             if not outcome.converged:

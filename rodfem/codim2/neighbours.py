@@ -33,7 +33,7 @@ from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import FOLD
 from rodfem.continuation.singular import SingularState, SingularSystem
 from rodfem.errors import ConvergenceError
-from rodfem.fem.state import line
+from rodfem.fem.state import load_line
 from rodfem.linalg.orthogonal import combine
 from rodfem.tolerances import INSIDE, SAME_SPECIAL, round_off, unit
 
@@ -93,8 +93,7 @@ class Neighbours:
     def _solved(self, near: Sequence[Adjoint | tuple[PETSc.Vec, list[PETSc.Vec]]], values: Values) -> list[Adjoint]:
         """The special points from those ``near`` them."""
         known = [(each.x, each.null) if isinstance(each, Adjoint) else each for each in near]
-        scene = self.system.scene
-        self.system.line = line(scene, {**values, scene.load: 0.0}, {scene.load: 1.0})
+        self.system.line = load_line(self.system.scene, **values)
         found = [self._one(known, number) for number in range(len(known))]
         for a, b in pairwise(sorted(found, key=lambda each: each.load)):
             if abs(a.load - b.load) < SAME_SPECIAL * unit(a.load, one=self.solver.units.load) and self._alike(a, b):
@@ -177,9 +176,8 @@ class Rods:
     ) -> tuple[Rod, list[SingularState]]:
         """Special points of the rod, and where its witnesses are expected."""
         rods = in_line(known, values, sizes)
-        weights, scene = np.array(WEIGHTS[len(rods) - 1]), solver.system.scene
-        constants = {name: p.value for name, p in scene.parameters.items()} | dict(zip(self.names, values, strict=True))
-        solver.system.line = line(scene, {**constants, scene.load: 0.0}, {scene.load: 1.0})
+        weights = np.array(WEIGHTS[len(rods) - 1])
+        solver.system.line = load_line(solver.system.scene, **dict(zip(self.names, values, strict=True)))
 
         def expected(of: Callable[[Rod], list[PETSc.Vec]]) -> list[PETSc.Vec]:
             return [combine([*states], weights) for states in zip(*map(of, rods), strict=True)]

@@ -11,22 +11,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import copysign, inf
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from rodfem.continuation.branch import FIRST_BRANCH, Point
+from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.curves import ROWS, across_orbit, predict_at_load
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.errors import ConvergenceError, InputError, SceneError
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import Shape
 from rodfem.stability.dependence import may_depend, require_independent_constraints
-
-if TYPE_CHECKING:
-    from rodfem.continuation.branch_solver import BranchSolver
 
 BENT = 1e-6
 """Distance from the chord, over the rod's length, and rotation from the scene's start, in radian, that are none."""

@@ -52,9 +52,9 @@ def line(scene: Scene, origin: Mapping[str, float], direction: Mapping[str, floa
     return Line(scene, np.array(start), np.array([direction.get(name, 0.0) for name in scene.parameters]))
 
 
-def load_line(scene: Scene) -> Line:
-    """Line along which the scene's load varies and all else has the scene's values."""
-    return line(scene, {scene.load: 0.0}, {scene.load: 1.0})
+def load_line(scene: Scene, /, **constants: float) -> Line:
+    """Line along which the scene's load varies, with these ``constants``, and the scene's values for all others."""
+    return line(scene, {**constants, scene.load: 0.0}, {scene.load: 1.0})
 
 
 class Energies(NamedTuple):

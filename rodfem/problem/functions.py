@@ -303,9 +303,9 @@ def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
             yield what, function, rod if role.along else point
 
 
-def asked_for(scene: Scene, c: Constants | None = None) -> set[str]:
-    """Names of the constants ``c``, by default the scene's own, that the equations of a scene ask for."""
-    c, asked = watched(c or scene.constants())
+def asked_for(scene: Scene) -> set[str]:
+    """Names of the constants that the equations of a scene ask for."""
+    c, asked = watched(scene.constants())
     for _, function, role in functions_of(scene):
         if role.call == "f(c)":
             function(c)

@@ -15,7 +15,6 @@ ends some ``1e-8`` away, where ``sigma`` is as small.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,13 +23,11 @@ from petsc4py import PETSc
 
 from rodfem.errors import SceneError
 from rodfem.fem.formulations import CONTACT_FORCE
+from rodfem.fem.shape import Shape
 from rodfem.linalg.matrices import EPS
 from rodfem.linalg.orthogonal import generic
 from rodfem.stability.pencil import Blocks, Pencil
 from rodfem.tolerances import SAME_LOAD
-
-if TYPE_CHECKING:
-    from rodfem.fem.shape import Shape
 
 NAMES = {"eta": "unit length of q", "n": "kinematics r' = R v", "scalars": "position of the ends"}
 TIGHT = "the rod cannot stretch and is taut, any tension balances it; begin where it is slack, or let it stretch."

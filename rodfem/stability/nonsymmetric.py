@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,15 +22,13 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
+from rodfem.fem.system import System
 from rodfem.linalg.matrices import EPS, gathered, local_rows, rounding_of
 from rodfem.problem.functions import floats
 from rodfem.stability import motion_names
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.pencil import PencilMatrices, assemble_pencil, exclude_modes, in_units, symmetry_modes
 from rodfem.stability.spectrum import REAL, SHIFT, Eigenpairs, Spectrum, inside, size_of_zero, times
-
-if TYPE_CHECKING:
-    from rodfem.fem.system import System
 
 MULTIPLE, ALIKE = 1e-8, 1e-6
 """Eigenvalues that differ by less than this, relative, are one that is multiple; have one name, and one curve."""
