@@ -10,7 +10,7 @@ import pytest
 from hemitropic_cases import scene
 
 import rodfem
-from rodfem import Diagram, InputError, Plan, Scene
+from rodfem import Diagram, InputError, Plan, Scene, pinned
 from rodfem.app import console
 
 
@@ -32,6 +32,34 @@ def test_the_lines_of_a_notebook(diagram: Diagram) -> None:
     assert not diagram.special("transcritical") and diagram.special("fold")
     with pytest.raises(InputError, match=r"There is no kind 'fork': choose one of branch point, fold, .*pitchfork"):
         diagram.special("fork")
+
+
+def test_twenty_wishes_are_a_line_each(diagram: Diagram) -> None:
+    """What took a person a dozen tries, with its shape or its value."""
+    pytest.importorskip("xarray")
+    point, branch = next(p for p in diagram.at(0.5) if p.stable), diagram["branch 1"]
+    rows, fold, axes = len(point.s), diagram.special("fold")[0], plt.figure().gca()
+    assert point.r.shape == (rows, 3)
+    assert point.directors.shape == (rows, 3, 3)
+    assert point.strain.shape == point.curvature.shape == (rows, 3)
+    assert point.force.shape == point.moment.shape == (rows, 3)
+    assert point.force_in_space.shape == point.moment_in_space.shape == (rows, 3)
+    assert point.profile([0.0, 0.5]).r.shape == (2, 3)
+    assert np.allclose(point.reactions.left.force + point.reactions.right.force, 0.0, atol=1e-9)
+    assert point.branch == "branch 1"
+    assert branch["load"].shape == (len(branch.points),)
+    assert list(branch.to_dataframe().load) == list(branch["load"])
+    assert set(diagram.to_dataframe().branch) == {"straight", "branch 1", "branch 2"}
+    assert diagram.to_xarray()["r"].dims == ("point", "node", "component")
+    assert [s.negative_before for s in diagram.special("pitchfork")] == [0, 2]
+    assert len(diagram.states(0.5)) == 3
+    assert diagram.plot(ax=axes) is axes.figure
+    assert diagram.view()._repr_html_().startswith("<iframe")
+    assert fold.errors["energy"] > 0.0 and fold.errors["reactions"].shape[-1] == 3
+    assert pinned((0.0, 0.0, 1.0)).position == (0.0, 0.0, 1.0)
+    assert diagram.again(depth=0)["straight"].parent is None
+    assert repr(point) == "<Point at load 0.5: ordinate 1.72903, stable>"
+    plt.close("all")
 
 
 def test_a_locus_at_a_value_of_a_parameter(diagram: Diagram) -> None:
