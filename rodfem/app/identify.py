@@ -13,10 +13,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from petsc4py import PETSc
 
 from rodfem.codim2.adjoint import state_derivative
 from rodfem.codim2.criteria import restoration
@@ -33,6 +32,9 @@ from rodfem.problem.arguments import Check, checked, each
 from rodfem.problem.field import Field, names, with_fields
 from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
+
+if TYPE_CHECKING:
+    from petsc4py import PETSc
 
 CRITICAL, ORDINATE, SHAPE = "critical loads", "ordinate", "shape"
 """What may be measured: see :func:`identify`."""
@@ -195,11 +197,10 @@ class _Model:
             scene.check_constant(name)
         self.scene, self.tables, self.chosen = scene, tables, chosen
         self.solver, self._values = Solver(scene, mesh), {name: p.value for name, p in scene.parameters.items()}
-        loads = sorted({float(row[0]) for kind in (ORDINATE, SHAPE) for row in tables.get(kind, ())})
-        ascending = scene.span[0] <= scene.span[1]
+        loads = {float(row[0]) for kind in (ORDINATE, SHAPE) for row in tables.get(kind, ())}
         self._states = dict[float, "PETSc.Vec"]()
         point = None
-        for load in loads if ascending else loads[::-1]:
+        for load in sorted(loads, reverse=scene.span[0] > scene.span[1]):
             point = self.solver.equilibrium(load, point)
             self._states[load] = point.x
         self._critical = None

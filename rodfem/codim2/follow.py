@@ -108,11 +108,9 @@ class Half:
         last = recent[-1]
         guess = predict(recent, last.s + step)
         p, x, dp, dx = guess
-        over = self.plane.outside(p)
-        if over is None:
+        if (over := self.plane.outside(p)) is None:
             node = self._place(last, self.criterion.correct(guess, last, 0.5 * step))
-            over = self.plane.outside(node.p)
-            if over is None:
+            if (over := self.plane.outside(node.p)) is None:
                 if self._cosine(node, dp, dx) < ALIGNED or node.s - last.s > 2 * step:
                     raise ConvergenceError("the curve bends too sharply")
                 if node.orientation != last.orientation and not self._leads_across(last, node):

@@ -105,8 +105,7 @@ class Neighbours:
         (x, null), fold = known[number], self._folds[number]
         others = chain(*(vectors for j, (_, vectors) in enumerate(known) if j != number))
         states = SingularSystem(self.solver, [*null, *([] if fold else others)], len(null), fold=fold)
-        there = states.solve(x)
-        if there is None:
+        if (there := states.solve(x)) is None:
             raise ConvergenceError("Newton's method does not converge")
         return Adjoint(self.solver, there.x, states)
 
