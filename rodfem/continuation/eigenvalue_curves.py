@@ -114,11 +114,6 @@ class Located:
     left: float  # what its interpolation leaves open of the mean
     clear: float  # a load near by at which the eigenvalues are apart
 
-    @property
-    def mean_uncertainty(self) -> float:
-        """Uncertainty of the mean of the cluster."""
-        return self.left + abs(self.drift) * self.uncertainty
-
 
 def locate_flutter(at: AtLoad, cluster: Cluster, load: float, width: float) -> Located:
     """Load at which ``D`` of a cluster vanishes, from about ``load``; raises :class:`ConvergenceError`.

@@ -106,16 +106,18 @@ def downhill(solver: BranchSolver, load: float) -> tuple[PETSc.Vec, NewtonResult
 
 
 def examined(solver: BranchSolver, x: PETSc.Vec, outcome: NewtonResult) -> tuple[NewtonResult, bool]:
-    """The iteration that led to ``x``, and whether that is stable.
+    """The iteration that led to ``x``, and whether that is stable, as far as there is an index.
 
     It has not converged where eigenvalues cannot be counted: a state so far away that it is round-off is none.
     """
-    if not outcome.converged:
-        return outcome, False
+    if not (outcome.converged and solver.conservative):
+        return outcome, outcome.converged
     try:
-        return outcome, is_stable(solver, x)
+        return outcome, decide(solver.inertia.at(x)).index.negative == 0
     except ConvergenceError:
         return replace(outcome, converged=False), False
+    finally:
+        solver.inertia.forget_band()  # it may be far from all others: its round-off is that of no other
 
 
 def _relaxed(
@@ -128,15 +130,6 @@ def _relaxed(
         if outcome.converged and solver.system.drift(x) > 1e-8 * solver.system.stiffness_scale:  # clearly not zero
             x, outcome = solver.at_load(x, load)
     return x, outcome
-
-
-def is_stable(solver: BranchSolver, x: PETSc.Vec) -> bool:
-    """Whether the index of an equilibrium is zero, as far as there is one: of loads with a potential."""
-    try:
-        return not solver.conservative or decide(solver.inertia.at(x)).index.negative == 0
-    finally:
-        if solver.conservative:
-            solver.inertia.forget_band()  # it may be far from all others: its round-off is that of no other
 
 
 def _may_move(solver: BranchSolver, x: PETSc.Vec) -> bool:

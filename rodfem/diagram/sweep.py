@@ -354,6 +354,6 @@ class SweepErrors(Enriched):
             width = 0.01 * max(abs(load), abs(self.span[1] - self.span[0]))
             located = located_flutter(measured, cluster, load, width)
             load, left = located.load, located.uncertainty
-            mu, doubt = located.cluster.mean, located.mean_uncertainty
+            mu, doubt = located.cluster.mean, located.left + abs(located.drift) * located.uncertainty
         s.omega2_error = bound(s.omega2, mu, max(doubt, 10.0 * abs(mu) * ROUND_OFF), self.part)
         return load, left
