@@ -19,6 +19,7 @@ from rodfem.errors import SceneError
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.forms.rotation import IDENTITY
 from rodfem.problem.arguments import plain
+from rodfem.problem.functions import derived
 from rodfem.problem.quaternions import CONJUGATE, directors, of_vector, product
 from rodfem.problem.scene import Scene
 from rodfem.tolerances import NEGLIGIBLE
@@ -34,13 +35,13 @@ def natural_shape(scene: Scene, load: float) -> tuple[np.ndarray, np.ndarray, np
 
     None if it is straight, or does not fit there at this ``load``.
     """
-    found = _between_ends(scene, load)
+    found = derived(scene, ("ends", load), lambda: _between_ends(scene, load))
     return found[0] if found is not None and found[1] < FIT else None
 
 
 def misfit(scene: Scene, load: float) -> str:
     """Sentence on a start that is not the rod at rest, as the ends of a scene do not admit that at a ``load``."""
-    found = None if scene.start is not None else _between_ends(scene, load)
+    found = None if scene.start is not None else derived(scene, ("ends", load), lambda: _between_ends(scene, load))
     if found is None or found[1] < FIT:
         return ""
     return (

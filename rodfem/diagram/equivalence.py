@@ -26,7 +26,7 @@ from rodfem.deflation.symmetries import candidates, mirrors
 from rodfem.diagram.events import Step
 from rodfem.errors import ConvergenceError
 from rodfem.problem.units import Units
-from rodfem.stability.inertia import NULL, Factored
+from rodfem.stability.inertia import NULL, Factored, Index
 from rodfem.tolerances import LOCATED, NEGLIGIBLE, SAME_SPECIAL, SAME_STATE, unit
 
 CARRIED, OTHER = 1e-3, 1e-6
@@ -77,22 +77,21 @@ def are_images(solver: BranchSolver, special: SpecialPoint, a: Point, b: Point, 
 
 def _as_stable(at: Callable[[PETSc.Vec], Factored], a: Point, b: Point) -> bool:
     """Whether two states, whose second variations are those ``at`` them, have the same index and eigenvalues."""
-    indices = [at(point.x).count() for point in (a, b)]
-    if indices[0] != indices[1]:
+    (index, first, noise), (other, second, _) = (_nearest(at(point.x)) for point in (a, b))
+    if index != other:
         return False
-    (first, noise), (second, _) = (_nearest(at(point.x), indices[0].zero) for point in (a, b))
     # of a zero the mesh makes a value as it lies to the elements: two of one sign are alike
     alike = (noise > 0) & (first * second > 0)
     return bool((alike | (abs(first - second) <= 1e-3 * abs(first) + noise)).all())  # meshes are not symmetric
 
 
-def _nearest(found: Factored, zero: int) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues that count as ``zero`` and a few more, ascending, and the round-off of those; 0 for others."""
-    found.count()
-    values, vectors = found.nearest(zero + 3, NULL)
+def _nearest(found: Factored) -> tuple[Index, np.ndarray, np.ndarray]:
+    """Index, zero eigenvalues and a few more, ascending, and the round-off of the former; 0 for others."""
+    index = found.count()
+    values, vectors = found.nearest(index.zero + 3, NULL)
     order = np.argsort(values)
     noise = np.array([found.noise(v) for v in vectors]) * (abs(values) <= found.inertia.tolerance)
-    return values[order], noise[order]
+    return index, values[order], noise[order]
 
 
 def image_of(branch: Branch, solver: BranchSolver) -> str:

@@ -55,11 +55,12 @@ def find_symmetries(equations: Equations) -> list[Symmetry]:
     fields, parts = equations.fields, elementary_generators(equations.fields)
     single = [Symmetry(row, parts) for row in np.eye(len(parts))]
     moved, dofs_held = np.zeros((len(parts),) * 2), _clamped(fields)
+    back = [s.linear(fields).T for s in single]
     rows, sizes, held = [], [], [np.zeros((1, len(parts)))]
     for seed in range(3):
         state = generic_state(equations, seed)
         changes = np.array([s.change(state) for s in single])
-        row, size = _change_of_equations(state, single, changes)
+        row, size = _change_of_equations(state, back, changes)
         rows.append(row)
         sizes.append(size)
         # conditions on the weights a of a symmetry: invariance, and no motion of what an end holds
@@ -169,17 +170,15 @@ def _null_space(rows: np.ndarray, exact: float = EXACT) -> np.ndarray:
     return np.asarray(vectors[singular < exact * max(singular[0], 1.0)].T)
 
 
-def _change_of_equations(
-    state: NodalValues, single: list[Symmetry], changes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), and sums of magnitudes, (m,).
+def _change_of_equations(state: NodalValues, back: list[Any], changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``dF(x)[g] + A^t F(x)`` of each generator, (conditions, m), by its ``A^t``, and sums of magnitudes, (m,).
 
     Across the columns of the multipliers that close a ring: what these have to change by follows from the rest.
     """
     fields, residual = state.fields, state.covector()
     whole = residual.copy()  # a scalar has a copy in each cell: all of its equation
     whole[fields.copies] = residual[fields.copies].sum(axis=0)
-    tangent, back = state.tangent(), [s.linear(fields).T for s in single]
+    tangent = state.tangent()
     table = _summed(fields, np.array([tangent @ g for g in changes]), copies=True)
     table += _summed(fields, np.array([A @ whole for A in back]))
     sizes = _summed(fields, np.array([abs(tangent) @ abs(g) for g in changes]), copies=True)
