@@ -324,9 +324,7 @@ class CriticalLoads:
             events.append(event)
             return
         if known.change * event.change > 0 and not event.note:
-            raise ConvergenceError(
-                f"Two pairs end in one collision at {self._load} = {event.load:.8g}: use a smaller range."
-            )
+            raise ConvergenceError(f"Two pairs collide at {self._load} = {event.load:.8g}: use a smaller range.")
         known.change += event.change
         known.uncertainty = max(known.uncertainty, event.uncertainty + abs(known.load - event.load))
         if abs(event.omega2) < abs(known.omega2):

@@ -22,7 +22,7 @@ from rodfem.diagram.equilibria import Overfull, first_state, name_of_first
 from rodfem.diagram.equivalence import are_images, equivalent, neighbours, other_ordinates
 from rodfem.diagram.special_search import Gap, arms
 from rodfem.diagram.tracer import Tracer
-from rodfem.errors import ConvergenceError, SceneError
+from rodfem.errors import ConvergenceError, SceneError, many
 from rodfem.fem.newton import NewtonResult
 from rodfem.fem.shape import link
 from rodfem.stability.reduced_stiffness import bordered_of
@@ -75,10 +75,8 @@ class Explorer(Tracer):
         for point in points:
             (others if self.solver.lost_convexity(point.x) else convex).append(point)
         if others:
-            many, near = f"{len(others)} equilibri{'a' if others[1:] else 'um'}", f"{others[0].load:.6g}"
-            self.observer.note(
-                f"  {many} near {self.scene.load} = {near}: not followed, the stored energy is not convex there"
-            )
+            near = f"{many(len(others), 'equilibrium', 'equilibria')} near {self.scene.load} = {others[0].load:.6g}"
+            self.observer.note(f"  {near}: not followed, the stored energy is not convex there")
         return convex
 
     def _resolved(self, points: list[Point]) -> list[Point]:

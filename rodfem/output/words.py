@@ -239,9 +239,7 @@ def words_of(branch: Data, *, planar: bool = False, leaves: str = "") -> list[Wo
         row = row_of(branch, place)
         plain = _at_special(row, specials[place]) or _stability(row)
         if place == 0 and leaves:
-            plain = Words(
-                CRITICAL, plain.index, f"Branch point, where this branch leaves {leaves}; index {plain.index}."
-            )
+            plain = Words(CRITICAL, plain.index, f"Branch point, where it leaves {leaves}; index {plain.index}.")
         sentence = plain.sentence
         if planar and plain.verdict == STABLE and row.get("negative_in_space") is None:
             sentence = sentence.replace("Stable", "Stable in its plane (not examined in space)", 1)

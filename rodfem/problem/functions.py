@@ -258,9 +258,7 @@ class CheckedPlace(SimpleNamespace):
         if name.startswith("__"):
             raise AttributeError(name)
         if name in ("r", "dr") and "r" not in vars(self):
-            raise NoCentreline(
-                "The reduced formulation has no centreline here: use Discretization(formulation='pointwise')."
-            )
+            raise NoCentreline("Reduced formulations have no centreline: use Discretization(formulation='pointwise').")
         has = "r, q, R, d1, d2, d3, s and length, and where it is the whole rod dr, v and k"
         raise UnnamedError(f"asks for {name!r} of a place: it has {has}.")
 

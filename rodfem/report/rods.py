@@ -39,7 +39,7 @@ ZERO = 1e-7  # a force or moment below this, relative to the natural force or mo
 OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
 """Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
 SMALL = 1e-3  # share of the greatest eigenvalue below which differences of eigenvalues are relative to this share
-BUDGET = 40_000  # stations of all states together above which each has fewer: about 6 MB of the page
+LEAST, BUDGET = 49, 40_000  # stations of a state at least, and of all together: about 6 MB of the page
 
 
 def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any]:
@@ -56,7 +56,7 @@ def rods_of(data: Mapping[str, Any], groups: Any, folder: Path) -> dict[str, Any
         shown = branch_data(branch, here, colour, data)
         rows = list(map(reactions_by_name, branch["columns"].get("reactions") or []))
         shown["ordinates"] |= {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
-        shown |= _drawn(here, group, look, shelf) | profiles_data(group, states)
+        shown |= _drawn(here, group, look, shelf, of := drawn_rows(branch, states)) | profiles_data(group, states, of)
         shown |= _moving(branch, here, group, folder / "modes.h5", look)
         traced = is_traced(branch, data["branches"])
         branches.append(shown | {"image": "" if traced else branch.get("image", "")})
@@ -89,31 +89,38 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, l
     return {"modes": modes, "missed": dict(map(attrgetter("row", "trouble"), missed))}
 
 
-def profiles_data(group: Any, states: int) -> dict[str, Any]:
-    """Profiles of a branch: ``profile`` (P, M, 17), arclength, components of v, k, n, m along the directors, and these.
+def drawn_rows(branch: Mapping[str, Any], states: int) -> list[int]:
+    """Rows of a branch that are drawn: all, or of too many ``states`` each at least that is special, and every n-th."""
+    rows, every = len(branch["columns"]["load"]), -(-states * LEAST // BUDGET)
+    return sorted({*range(0, rows, every), rows - 1, *(special["row"] for special in branch["special"])})
 
-    ``element`` (P,) says how many of the M points an element has, which determine its polynomials, and 0 where some are
+
+def profiles_data(group: Any, states: int, rows: list[int]) -> dict[str, Any]:
+    """Profiles of a branch: ``profile`` (D, M, 17), arclength, components of v, k, n, m along the directors, and these.
+
+    ``element`` (D,) says how many of the M points an element has, which determine its polynomials, and 0 where some are
     left out; ``jumps`` (P,) are those of each of the four between elements.
     """
     found = [profiles_of(group, row) for row in range(len(group["load"]))]
     most = group[POINTS][0].size
     acting = [float(place.attrs["s"]) for kind in (SUPPORTS, CONSTRAINTS) for place in group.get(kind, {}).values()]
-    kept = np.unique(np.linspace(0, most - 1, min(most, max(2, BUDGET // states))).round().astype(int))
+    kept = np.unique(np.linspace(0, most - 1, min(most, max(LEAST, BUDGET // states))).round().astype(int))
     out = np.full((len(found), most, 5 + 3 * len(PROFILES)), np.nan)
     for row, (place, one) in enumerate(zip(out, found, strict=True)):
         columns = [one.points.reshape(-1, 1), *(one.fields[symbol].reshape(-1, 3) for symbol in PROFILES)]
         columns.append(curve_at(group, row, one.points.ravel())[2])
         place[: one.points.size] = np.hstack(columns)
-    element = [one.points.shape[1] * (len(kept) == most) for one in found]
+    element = [found[row].points.shape[1] * (len(kept) == most) for row in rows]
     jumps = {symbol: plain([one.jump(symbol, acting) for one in found]) for symbol in PROFILES}
-    return {"profile": packed(out[:, kept]), "element": element, "jumps": jumps}
+    return {"profile": packed(out[rows][:, kept]), "element": element, "jumps": jumps}
 
 
-def _drawn(shapes: Shapes, group: Any, look: Look, shelf: dict[tuple[str, str], int]) -> dict[str, Any]:
-    """Shapes of all states, and the bodies of their supports and loads: numbers on the ``shelf``, and maps."""
+def _drawn(shapes: Shapes, group: Any, look: Look, shelf: dict[tuple[str, str], int], few: list[int]) -> dict[str, Any]:
+    """Shapes of a ``few`` rows, the nearest of these to each row, and the bodies of supports and loads."""
     found = [glyphs_of(read_setting(group, row), shapes.s, shapes[row], look) for row in range(len(shapes.r))]
     return {
-        "shape": packed(np.concatenate([shapes.r, shapes.q], axis=2)),
+        "shape": packed(np.concatenate([shapes.r, shapes.q], axis=2)[few]),
+        "drawn": abs(np.arange(len(found))[:, None] - few).argmin(axis=1).tolist(),
         "bodies": [[shelf.setdefault((x.body, x.color), len(shelf)) for x in glyphs] for glyphs in found],
         "maps": packed(np.array([x.map for glyphs in found for x in glyphs]).reshape(-1, 12)),
     }
@@ -151,7 +158,7 @@ def _solid(of: tuple[str, str]) -> dict[str, Any]:
 
 def stations(nodes: int, states: int) -> int:
     """Number of stations for states with so many nodes, odd, so that the middle of the rod is one."""
-    return max(49, min(2 * nodes - 1, 241, BUDGET // max(states, 1))) | 1
+    return max(LEAST, min(2 * nodes - 1, 241, BUDGET // max(states, 1))) | 1
 
 
 @dataclass(frozen=True)

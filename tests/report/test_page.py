@@ -91,6 +91,20 @@ def test_reactions_are_ordinates_with_bars(results: Path) -> None:
             assert re.fullmatch(r"[\d.]+ \(\de-\d+\)", bar)
 
 
+def test_of_too_many_states_the_nearest_is_drawn(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A page of 3,218 states has 8.7 MB for 13.9: special ones, the ends and every n-th have shapes and profiles."""
+    everything = payload_of(results / "pinned")["branches"]
+    states = sum(len(branch["load"]) for branch in everything)
+    monkeypatch.setattr("rodfem.report.rods.BUDGET", 49 * (states // 3))
+    for few, branch in zip(payload_of(results / "pinned")["branches"], everything, strict=True):
+        (shapes, *_), rows = few["shape"]["shape"], len(branch["load"])
+        own = [row for row in range(rows) if row in (0, rows - 1) or row in (s["row"] for s in branch["special"])]
+        assert shapes == few["profile"]["shape"][0] == len(few["element"]) < rows == len(few["drawn"])
+        assert sorted(set(few["drawn"])) == list(range(shapes)) and few["drawn"] == sorted(few["drawn"])
+        assert len({few["drawn"][row] for row in own}) == len(own)
+        assert branch["drawn"] == list(range(rows)) and few["bodies"] == branch["bodies"]
+
+
 def test_the_page_needs_no_network_and_runs_no_text(results: Path) -> None:
     clean = payload_of(results / "short")
     plain = Elements(page_of(clean))

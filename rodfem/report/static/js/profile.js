@@ -90,8 +90,8 @@ function redraw() {
     error.textContent = "";
     return empty(plot, "The files of this run have no strains, forces and moments:\nrun the scene again.");
   }
-  const all = found.inSpace ? turned(b) : values(b.profile), size = b.profile.shape[1] * SIZE;
-  const column = curves(all.subarray(state.row * size, (state.row + 1) * size), b.element[state.row]), s = column(0);
+  const all = found.inSpace ? turned(b) : values(b.profile), size = b.profile.shape[1] * SIZE, i = b.drawn[state.row];
+  const column = curves(all.subarray(i * size, (i + 1) * size), b.element[i]), s = column(0);
   const traces = names.map((name, i) => ({
     x: s,
     y: column(first + i),

@@ -22,7 +22,7 @@ const choice = document.getElementById("view");
 
 export const makeRod = (colour, opacity) => new Tube(data.outline, values(data.outline), stations, true, colour, opacity);
 export const makeStripe = () => new Tube(data.stripe, values(data.stripe), stations, false, STRIPE);
-export const shapeOf = (b, row) => entry(b.shape, row);
+export const shapeOf = (b, row) => entry(b.shape, b.drawn[row]);
 export const stage = new Stage(document.getElementById("rod"));
 const rod = makeRod(ROD), stripe = makeStripe(), first = makeRod(FIRST, 0.55), solids = new Solids();
 Object.assign(first.material, { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 }); // behind the state where they coincide
