@@ -190,6 +190,24 @@ def test_no_page_is_wider_than_its_window(opened: Callable[..., Any], wide: int)
     assert all(card["width"] > 300 and card["height"] > 150 for card in cards)
 
 
+def test_a_row_that_is_not_drawn_has_the_nearest_shape(
+    opened: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rodfem.report.rods.BUDGET", 49 * 6)
+    page = opened("pinned", change=lambda payload: payload)
+    number = "return import('report/data').then(({ data }) => data.branches[1].%s)"
+    drawn, bodies = (page.execute_script(number % name) for name in ("drawn", "bodies.length"))
+    assert len(set(drawn)) < len(drawn) == bodies
+    row = next(row for row in range(1, len(drawn)) if drawn[row] == drawn[row - 1])
+    found = []
+    for at in (row - 1, row):
+        page.execute_script(f"import('report/store').then((store) => store.select(1, {at}))")
+        until(page, lambda at=at: shown(page) == ("branch 1", at))
+        curves = "return document.getElementById('profile').data.map((trace) => Array.from(trace.y))"
+        found.append((page.find_element(By.ID, "state-load").text, page.execute_script(curves)))
+    assert found[0][0] != found[1][0] and found[0][1] == found[1][1]
+
+
 def test_an_address_leads_to_what_it_names(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
     page.get(page.current_url.partition("#")[0] + "#branch=branch+1&row=2&ordinate=energy")
