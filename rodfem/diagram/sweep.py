@@ -236,9 +236,9 @@ class Sweep:
             after = negative + event.change
             if event.cluster is not None:
                 self._critical(branch, event, (a, b), (negative, after))
-            elif event.change > 0:
-                self._hidden(event, a, b)
             negative = after
+        if hidden := sum(max(event.change, 0) for event in events if event.cluster is None):
+            self._hidden(hidden, a, b)
         negative += self._through_infinity(branch, second) if self.critical.poles else 0
         if negative != b.negative:
             change = Unexplained(branch.points[-1], b, negative, b.negative, "use a smaller range or more elements")
@@ -261,11 +261,11 @@ class Sweep:
         row.point.negative += turned
         return lacking + sum(poles) + turned
 
-    def _hidden(self, event: Critical, a: Point, b: Point) -> None:
-        """Say that round-off hides a collision between two rows; where some are unstable only their number is open."""
+    def _hidden(self, change: int, a: Point, b: Point) -> None:
+        """Say that round-off hides collisions between two rows; where some are unstable only their number is open."""
         report = self.observer.note if a.negative else self.observer.warn
         words = (
-            f"{event.change} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at {a.load:.6g} by no "
+            f"{change} eigenvalues that are complex at {self._load} = {b.load:.6g} are so at {a.load:.6g} by no "
             f"more than round-off: the rows before, which count {a.negative}, may count too few."
         )
         report(Remark(words, a.load, b.load))

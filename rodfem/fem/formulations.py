@@ -221,7 +221,7 @@ class Reduced(Formulation):
     def refusal(self, scene: Scene) -> str:
         """What needs the centreline."""
         reason = needs_centreline(scene)
-        return reason and f"has no centreline, which {reason} needs"
+        return reason and f"has no centreline, and {reason} needs one"
 
     def blocks(self, degree: int) -> list[Block]:
         """None."""

@@ -52,6 +52,8 @@ def test_flutter_at_any_torque(span: tuple[float, float], loads: int, monkeypatc
     assert after.error_estimate < 1e-11
     assert "!" not in said
     assert all(p.negative > 0 for p in branch.points if p.load != 0.0)
+    hidden = [line for line in said.splitlines() if "eigenvalues that are complex at" in line]
+    assert len(set(hidden)) == len(hidden)  # one note of a step
 
 
 def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:

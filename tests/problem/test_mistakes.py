@@ -567,7 +567,7 @@ def test_scenes_that_are_no_mistakes() -> None:
 )
 def test_no_centreline(change: dict, what: str) -> None:
     scene = Scene(**(GOOD | change))
-    with pytest.raises(InputError, match=f"{what} needs: use Discretization.formulation=.pointwise.."):
+    with pytest.raises(InputError, match=f"{what} needs one: use Discretization.formulation=.pointwise.."):
         Fields(scene, Discretization("reduced", 4, 3))
     assert Fields(scene, Discretization("auto", 4, 3)).discretization.formulation == "pointwise"
 
