@@ -272,6 +272,7 @@ class Diagram:
         """Contents of ``diagram.json``: see docs/files.md."""
         systems = [solver.system for solver in self.solvers]
         data = as_data(self.branches, systems, self.clock, self.span, self.plan.accuracy)
+        self.asked |= {} if EQUATIONS in self.asked else {EQUATIONS: fingerprint(systems[0], self.span)}
         own = {name: getattr(self, name) for name in ("asked", "complete", "run", "origin")}
         return data | self.remarks | own
 
@@ -419,12 +420,11 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
             if plan.accuracy is None and (doubt := check_start(found, plan.load_range(scene))):
                 recorder.warn(doubt)
-        asked = {"plan": entries(plan, scene), EQUATIONS: fingerprint(found.system, plan.load_range(scene))}
         if stressed := misfit(scene, plan.load_range(scene)[0]):
             recorder.note(stressed)
         recorder.system(found.system, plan.accuracy)
-        plan = _with_bars(plan, found, recorder)
-        if compiled and plan.error_bars and form_compiler.ALONE:
+        feasible = _with_bars(plan, found, recorder)
+        if compiled and feasible.error_bars and form_compiler.ALONE:
             compile_richer(found.system)
 
         def complete() -> None:
@@ -432,9 +432,9 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
             recorder.complete(diagram)
 
         explorer = Explorer if found.conservative else Sweep
-        tracer = explorer(found, plan, recorder, complete)
-        diagram = Diagram(scene, plan, tracer.branches, tracer.solvers)
-        diagram.warnings, diagram.notes, diagram.asked = recorder.warnings, recorder.notes, asked
+        tracer = explorer(found, feasible, recorder, complete)
+        diagram = Diagram(scene, feasible, tracer.branches, tracer.solvers)
+        diagram.warnings, diagram.notes, diagram.asked["plan"] = recorder.warnings, recorder.notes, entries(plan, scene)
         try:
             tracer.run()
         except BaseException as trouble:  # an interrupt, too: nothing that has been computed is lost
