@@ -88,8 +88,7 @@ def design(
     that are not to be negative, as ``lambda P: P[1] - 1.2 * P[0]``, and scipy's ``LinearConstraint`` or
     ``NonlinearConstraint`` on the numbers of all fields, in order.  ``of_trace`` are ``plan`` and ``discretization`` of
     :func:`~rodfem.trace`, by default with two elements for each number.  Raises :class:`~rodfem.errors.InputError` for
-    what is no constant, or no critical load in the range, and :class:`~rodfem.errors.ConvergenceError` where the loads
-    are lost on the way.
+    what is no constant, a load without potential and no critical load, :class:`ConvergenceError` where loads are lost.
     """
     _check(fields, maximise)
     mesh = Discretization(elements=max(8, *(2 * field.pieces for field in fields.values())))

@@ -437,6 +437,5 @@ def check_special(solver: BranchSolver, special: SpecialPoint) -> None:
         raise InputError(f"A point of the kind {special.kind!r} has no locus: choose one of {kinds}.")
     if special.kind.singular and not solver.conservative:
         raise InputError("The locus of a fold or a branch point needs the solver that found it.")
-    if special.kind == FLUTTER:
-        if why := special.note or "it was not found by a sweep" * (special.cluster is None):
-            raise InputError(f"This flutter has no locus: {why}.")
+    if special.kind == FLUTTER and (special.note or special.cluster is None):
+        raise InputError(f"This flutter has no locus: {special.note or 'no file has its modes, trace the rod again'}.")

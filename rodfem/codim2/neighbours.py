@@ -117,6 +117,7 @@ class Neighbours:
 
 def losses(branch: Branch, number: int) -> list[SpecialPoint]:
     """First special points of a branch at which its index grows, a ``number`` of them at most, up to the first fold."""
+    branch.points[0].own_solver.system.scene.require_potential("A choice by critical loads")
     found = [x for x in branch.special if x.kind.singular and x.negative_after > x.negative_before]
     last = next((i for i, x in enumerate(found) if x.kind == FOLD), number)
     return found[: min(last + 1, number)]

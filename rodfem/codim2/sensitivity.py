@@ -126,8 +126,8 @@ def tolerance(special: SpecialPoint, deviations: Mapping[str, float | tuple[floa
     pairs = {name: np.append(given, [np.inf] * (2 - np.size(given))) for name, given in deviations.items()}
     if not all(len(pair) == 2 and (pair > 0.0).all() for pair in pairs.values()):
         raise InputError(f"deviations is {dict(deviations)}: give positive ones, as in {{'A': 0.02, 'B': (0.02, 1)}}.")
-    parts = {known[name].words or name: _deviation(special, name, *pair.tolist()) for name, pair in pairs.items()}
-    return Tolerance(special.point.load, parts, special.error_estimate)
+    parts = {name: _deviation(special, name, *pair.tolist()) for name, pair in pairs.items()}
+    return Tolerance(special.point.load, {known[n].words or n: x for n, x in parts.items()}, special.error_estimate)
 
 
 def _deviation(special: SpecialPoint, name: str, size: float, length: float) -> float:

@@ -223,11 +223,7 @@ class Solver:
         called stable.  Raises :class:`~rodfem.errors.InputError` for a load that is not admissible, for known
         equilibria at another one, and where a load has no potential.  ``seed`` is that of the random guesses.
         """
-        if not self.equilibria.conservative:
-            raise InputError(
-                "A search by deflation needs a scene whose loads all have a potential: "
-                f"{', '.join(self.scene.without_potential())} has none."
-            )
+        self.scene.require_potential("A search by deflation")
         return [self.examined(p, compare=True) for p in Deflation(self.equilibria, load, known, seed).run(tries)]
 
 

@@ -510,6 +510,11 @@ class Scene(Contribution, metaclass=Stated):
             what for what, _, role in functions_of(self) if role.load and role.load.potential_in(planar=planar) is None
         ]
 
+    def require_potential(self, what: str) -> None:
+        """Raise :class:`SceneError` where ``what`` needs that all loads have a potential, and one has none."""
+        if lacking := ", ".join(self.without_potential()):
+            raise SceneError(f"{what} needs a scene whose loads all have a potential: {lacking} has none.")
+
     @cached_property
     def plain(self) -> tuple[bool, bool]:
         """Whether dead forces are all that loads the left end, and the right: they are the contact force there."""

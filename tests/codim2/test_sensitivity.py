@@ -92,6 +92,8 @@ def test_deviations_of_a_load() -> None:
     assert str(found).startswith("29.61 +- 0.89 (stiffness B), +- ") and str(found).endswith(" (mesh)")
     with pytest.raises(InputError, match="give positive ones"):
         buckling.tolerance({"A": -0.1})
+    with pytest.raises(InputError, match="'D' is no constant of the scene"):
+        buckling.tolerance({"D": 0.1})
 
 
 def test_deviations_of_a_load_by_those_of_a_field() -> None:
