@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rodfem.codim2.adjoint import state_derivative
-from rodfem.codim2.criteria import restoration
+from rodfem.codim2.adjoint import restoration, state_derivative
 from rodfem.codim2.neighbours import Neighbours, Values, in_parts, losses
 from rodfem.continuation.branch import Point
 from rodfem.diagram.diagram import MESH, trace

@@ -176,11 +176,8 @@ class Terminal(Report):
             states = [special for special in branch.special if special.kind == USER]
             for special, name in product([*_to_follow(branch), *states], sorted(asked)):
                 with self._guard(diagram, branch, special):
-                    found = (
-                        special.point.derivative(name)
-                        if special.kind == USER
-                        else special.derivative(name, along_the_rod=special.kind.singular)
-                    )
+                    user = special.kind == USER
+                    found = special.point.derivative(name) if user else special.derivative(name, along_the_rod=True)
                     special.derivatives[name] = found.value, found.error if bar else nan
                     if found.acts_along(special.point.load):
                         special.densities[name] = found.ends, found.density

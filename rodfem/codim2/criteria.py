@@ -9,22 +9,22 @@ At flutter two eigenvalues ``mu1``, ``mu2`` collide: ``D = ((mu1 - mu2)/2)^2`` v
 (:mod:`rodfem.stability.cluster`; two pairs of equal ones if the rod bends alike in all planes).  The eigenvalues have a
 square root there, but ``D`` is smooth in both parameters, so that ``D(a, b) = 0`` is a smooth curve unless the gradient
 of ``D`` vanishes (Seyranian & Mailybaev, *Multiparameter Stability Theory with Mechanical Applications*, World
-Scientific 2003, chapters 2 and 5).  A point of it is found on a line of the plane by the secant method for ``D``, its
-tangent from central differences.  Pairs that are equal by a symmetry have one ``D``; where they part, the curve ends.
-At flutter of a rod with drag the mean of two conjugate rates vanishes, which is as smooth: it takes the place of ``D``.
+Scientific 2003, chapters 2 and 5).  A point of it is found on a line of the plane by Newton's method for ``D``, with
+the derivatives of :mod:`rodfem.codim2.adjoint`.  Where pairs that are equal by a symmetry, and have one ``D``, part,
+the curve ends.  At flutter of a rod with drag the mean of two conjugate rates takes the place of ``D``, as smooth.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import chain
 
 import numpy as np
 from petsc4py import PETSc
 
+from rodfem.codim2.adjoint import IMPERFECT, Adjoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.curves import ROWS, cubic_weights, lagrange
 from rodfem.continuation.singular import SHARP, SPLIT, Curve, Linear, Section, SingularState, SingularSystem, Vectors
@@ -40,22 +40,15 @@ from rodfem.tolerances import NEGLIGIBLE, ROUND_OFF, TINY
 VANISHED = "another eigenvalue has vanished since the row before, seen from the start"
 UNSTABLE = "another frequency has become unstable, or stable, since the row before, seen from the start"
 """Marks of a row where their number has changed, with a potential and without one."""
-IMPERFECT = 1e-7
-"""Over the lowest bending eigenvalue, or over the terms that cancel: a larger imperfection is not one of the mesh."""
 PITCHFORK, WIDE = 1e-6, 4e-3
 """Derivative of an eigenvalue along its null vector, over the lowest bending one, of which a symmetry leaves less; step
 of second differences, which lose more digits to round-off, in the metric."""
 FEWER = 1e-5
 """Eigenvalues that differ by more than this, over the lowest bending one, or pairs whose ``D`` do, over the square of
 their mean, are not equal by a symmetry."""
-FIRST, DIFFERENCE = 1e-4, 1e-3
-"""First step of the secants, relative to the bounds, below which they end where they no longer shrink; step of the
-central differences of ``D``, and of a count next to a divergence load."""
-CENTRAL, INWARD = (
-    ((1.0, 0.5), (-1.0, -0.5)),
-    ((0.0, -25 / 12), (1.0, 4.0), (2.0, -3.0), (3.0, 4 / 3), (4.0, -1 / 4)),
-)
-"""Places and weights of a central difference, and of one of the fourth order to one side."""
+SMALL, DIFFERENCE = 1e-4, 1e-3
+"""Step, relative to the bounds, below which Newton's method ends where steps no longer shrink; that of a count next to
+a divergence load."""
 Interval = tuple[float, float]
 Prediction = tuple[np.ndarray, PETSc.Vec, np.ndarray, PETSc.Vec]
 """Parameters (2,) and state of a point that is expected, and their derivatives in arclength."""
@@ -153,16 +146,6 @@ class Plane:
     def words(self, p: np.ndarray, digits: int = 8) -> str:
         """Both parameters by name."""
         return ", ".join(f"{name} = {v:.{digits}g}" for name, v in zip(self.names, p, strict=True))
-
-
-@contextmanager
-def restoration(system: System) -> Iterator[None]:
-    """Restore on exit all that a locus changes: the line of parameters, phase conditions."""
-    before = system.line, system.phase
-    try:
-        yield
-    finally:
-        system.line, system.phase = before
 
 
 def predict(nodes: list[LocusPoint], s: float) -> Prediction:
@@ -343,13 +326,9 @@ class Collision(Criterion):
         super().__init__(solver, plane)
         self.eigensolver = NonsymmetricSolver(solver.system)
 
-    def _value(self, here: Measured) -> float:
-        """What vanishes on the curve, of a cluster at a state."""
-        return here.discriminant
-
-    def _sharp(self, noise: ClusterNoise) -> tuple[float, float]:
-        """The same by both subspaces, and its round-off."""
-        return noise.two_sided, noise.discriminant
+    def _noise(self, noise: ClusterNoise) -> float:
+        """Its round-off."""
+        return noise.discriminant
 
     def _split(self, here: Measured) -> tuple[float, float]:
         """By how much it may differ among pairs that are taken for one, and what is large."""
@@ -376,8 +355,8 @@ class Collision(Criterion):
         system.line = plane.line(guess[0], across)
         t, last, here, x = self._collide(guess[1], Cluster(basis, self._mean(near)), reach)
         p, omega2 = guess[0] + t * across, self._squared(here)
-        slopes, around = zip(*(self._slope(which, p, x, here) for which in range(2)), strict=True)
-        gradient, clearest = np.array(slopes), max((here, *chain(*around)), key=lambda m: m.spread)
+        adjoint, basis = Adjoint(self.solver, plane.at(p, x), here.cluster), here.cluster.basis
+        gradient = plane.width * [adjoint.rates.item(), adjoint.rates_in(plane.names[1]).item()]
         if not np.linalg.norm(gradient):
             raise ConvergenceError("what vanishes on the curve is constant")
         split, large = self._split(here)
@@ -385,7 +364,6 @@ class Collision(Criterion):
             raise Destroyed(f"its {here.cluster.size // 2} pairs of eigenvalues do not meet together any more")
         dq = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
         orientation = 1 if dq @ forward >= 0 else -1
-        basis = clearest.cluster.basis
         rest = unstable(self.eigensolver.at(plane.at(p, x)), basis.shape[1], basis)
         apart = SPLIT * split * abs(gradient) / (gradient @ gradient) * plane.width
         return LocusPoint(
@@ -401,57 +379,23 @@ class Collision(Criterion):
             rest=rest + (here.cluster.size if omega2 < 0 else 0),
         )
 
-    def _slope(self, which: int, p: np.ndarray, x: PETSc.Vec, here: Measured) -> tuple[float, list[Measured]]:
-        """Derivative in parameter number ``which`` of what vanishes, by clusters around: at a bound within it alone."""
-        plane = self.plane
-        self.solver.system.line = plane.line(p, plane.axis(which))
-        # D has a pole at what is not admissible, as a mass of zero
-        ends = self.solver.system.scene.parameters[plane.names[which]].admissible
-        room = min(filter(None, (abs(end - p[which]) for end in ends)))
-        step = float(min(DIFFERENCE, room / 100 / plane.width[which]))
-        below, above = (abs(bound - p[which]) / plane.width[which] for bound in plane.intervals[which])
-        side = 1.0 if below < step else -1.0
-        stencil = INWARD if min(below, above) < step else CENTRAL
-        around = [
-            self._measured(side * place * step, x, Cluster(here.cluster.basis, here.cluster.mean))[0]
-            for place, _ in stencil
-        ]
-        parts = [weight * self._value(found) for found, (_, weight) in zip(around, stencil, strict=True)]
-        return side * sum(parts) / step, around
-
     def _collide(self, x: PETSc.Vec, cluster: Cluster, reach: float) -> Zero:
-        """Zero on the system's line of parameters: by secants, the last digits by both subspaces."""
-        t, other, before = 0.0, FIRST, np.inf
-        now, x = self._measured(t, x, cluster)
-        here, at_other = self._value(now), self._value(self._measured(other, x, cluster)[0])
-        slope = (at_other - here) / (other - t)
+        """Zero on the system's line of parameters, by Newton's method."""
+        t, before = 0.0, np.inf
         for _ in range(12):
-            if here == at_other:
+            now, x = self._measured(t, x, cluster)
+            cluster = Cluster(cluster.basis, now.cluster.mean)
+            adjoint = Adjoint(self.solver, x, cluster)
+            slope = adjoint.rates.item()
+            if not slope or abs(t) > reach:
                 break
-            step = -here * (other - t) / (at_other - here)
-            if abs(step) < NEGLIGIBLE or (abs(step) < FIRST and abs(step) > 0.3 * before):
-                return self._by_both_sides((t, abs(step), now, x), slope)
-            if abs(other - t) > 1e-6:  # else round-off hides the slope
-                slope = (at_other - here) / (other - t)
-            other, at_other, before = t, here, abs(step)
-            t += step
-            if abs(t) > reach:
-                break
-            now, x = self._measured(t, x, Cluster(cluster.basis, now.cluster.mean))
-            here = self._value(now)
+            step = -adjoint.left / slope
+            if abs(step) < NEGLIGIBLE or (abs(step) < SMALL and abs(step) > 0.3 * before):
+                with suppress(ConvergenceError):  # left vectors of a double zero are not found
+                    return t, abs(step) + self._noise(noise_of(self.eigensolver.at(x), now)) / abs(slope), now, x
+                return t, abs(step), now, x
+            t, before = t + step, abs(step)
         raise ConvergenceError("two eigenvalues do not collide near by")
-
-    def _by_both_sides(self, found: Zero, slope: float) -> Zero:
-        """Correct a zero twice, by its ``slope``, unless its left vectors are not found (a double zero)."""
-        t, _, now, x = found
-        with suppress(ConvergenceError):
-            for _ in range(2):
-                here, noise = self._sharp(noise_of(self.eigensolver.at(x), now))
-                step = -here / slope
-                t += step
-                now, x = self._measured(t, x, now.cluster)
-                found = t, abs(step) + abs(noise / slope), now, x
-        return found
 
     def _measured(self, t: float, guess: PETSc.Vec, cluster: Cluster) -> tuple[Measured, PETSc.Vec]:
         """The cluster at ``t`` on the system's line of parameters, and the state there."""
@@ -464,11 +408,9 @@ class Collision(Criterion):
 class Oscillation(Collision):
     """Corrects points of the plane to where two conjugate rates of a rod with drag have no real part."""
 
-    def _value(self, here: Measured) -> float:
-        return here.cluster.mean
-
-    def _sharp(self, noise: ClusterNoise) -> tuple[float, float]:
-        return noise.two_sided_mean, noise.mean
+    def _noise(self, noise: ClusterNoise) -> float:
+        """See :class:`Collision`."""
+        return noise.mean
 
     def _split(self, here: Measured) -> tuple[float, float]:
         apart = float(abs(here.values.real - here.cluster.mean).max())
@@ -498,7 +440,7 @@ def null_vectors(solver: BranchSolver, x: PETSc.Vec, number: int) -> tuple[list[
     right = left = [solver.inertia.seed(i) for i in range(number)]
     for _ in range(3):
         states.border(right, left)
-        right, left = states.relaxed(x)
+        right, left, *_ = states.relaxed(x)
     for side in (right, left):
         orthonormalize(side, metric)
     overlap = np.array([[(metric * v).dot(w) for w in left] for v in right])

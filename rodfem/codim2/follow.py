@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.adaptivity.error_estimate import RESOLVED_TO, Enriched, bound
+from rodfem.codim2.adjoint import restoration
 from rodfem.codim2.criteria import (
     DIFFERENCE,
     UNSTABLE,
@@ -32,7 +33,6 @@ from rodfem.codim2.criteria import (
     interpolant,
     null_vectors,
     predict,
-    restoration,
     unstable,
 )
 from rodfem.codim2.locus import Locus, Mark, Row
@@ -50,6 +50,7 @@ from rodfem.tolerances import INSIDE, same_special
 
 STEPS = StepControl(first=0.01, largest=0.04, smallest=1e-6, aim=2e-3, most=1000)
 """Steps of a locus, as shares of the bounds."""
+Vectors = list[PETSc.Vec]
 REACH = 1e-6  # distance, in the metric, that a point on a line of parameters may move by, however short the step
 NEAREST = "the index is that of the frequencies nearest zero: the mesh has too many unknowns to find all of them"
 
@@ -290,16 +291,9 @@ class Curve:
 
     def _guess(self, p: np.ndarray) -> LocusPoint:
         """The special point as a point ``p`` of the plane."""
-        solver, special = self.solver, self.special
-        x, left = self.plane.at(p, special.point.x.copy()), list[PETSc.Vec]()
-        modes, multiplicity = [*special.null_vectors, *special.nearby], special.multiplicity
-        if special.kind == FLUTTER:
-            assert special.cluster is not None
-            modes, multiplicity = solver.system.vectors(special.cluster.basis), 0
-        if special.kind == DIVERGENCE:
-            multiplicity = abs(special.negative_after - special.negative_before)
-            modes, left = null_vectors(solver, x, multiplicity)
-        omega2 = special.omega2 if special.kind == FLUTTER else np.nan
+        x = self.plane.at(p, self.special.point.x.copy())
+        modes, left, multiplicity = modes_of(self.solver, self.special, x)
+        omega2 = self.special.omega2 if self.special.kind == FLUTTER else np.nan
         return LocusPoint(p, x, p, x, p, omega2=omega2, modes=modes, left=left, multiplicity=multiplicity)
 
     def follow(self, steps: StepControl) -> None:
@@ -428,6 +422,16 @@ class Curve:
         if special.kind != BRANCH_POINT or special.test_function != "mu":
             return 0
         return int(-np.sign(change * special.point.slope))
+
+
+def modes_of(solver: BranchSolver, special: SpecialPoint, x: PETSc.Vec) -> tuple[Vectors, Vectors, int]:
+    """Modes of a ``special`` point at ``x``, left ones where they are others, and how many of them vanish."""
+    if special.kind == FLUTTER and special.cluster is not None:
+        return solver.system.vectors(special.cluster.basis), [], 0
+    if special.kind != DIVERGENCE:
+        return [*special.null_vectors, *special.nearby], [], special.multiplicity
+    number = abs(special.negative_after - special.negative_before)
+    return *null_vectors(solver, x, number), number
 
 
 def check_special(solver: BranchSolver, special: SpecialPoint) -> None:

@@ -26,8 +26,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound
-from rodfem.codim2.adjoint import Adjoint
-from rodfem.codim2.criteria import FEWER, IMPERFECT, restoration
+from rodfem.codim2.adjoint import IMPERFECT, Adjoint, restoration
+from rodfem.codim2.criteria import FEWER
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import FOLD

@@ -1,12 +1,11 @@
 r"""Derivatives of critical loads in the constants of a scene, and along the rod; of a state's ordinate.
 
-Of folds and branch points see :mod:`rodfem.codim2.adjoint`.  Of flutter and divergence under loads
-without a potential the derivative is the slope of the tangent of their locus.
+See :mod:`rodfem.codim2.adjoint`.  An error is bounded by the same of a richer mesh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 
@@ -14,25 +13,27 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound
-from rodfem.codim2.adjoint import DIFFERENCES, Adjoint, ordinate_density, state_derivative
-from rodfem.codim2.criteria import Plane, restoration
-from rodfem.codim2.follow import Curve, RicherMesh, check_special
+from rodfem.codim2.adjoint import DIFFERENCES, Adjoint, Found, ordinate_density, restoration, state_derivative
+from rodfem.codim2.follow import check_special, modes_of
 from rodfem.codim2.neighbours import Neighbours
 from rodfem.continuation.branch import Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
-from rodfem.continuation.kinds import FOLD
+from rodfem.continuation.eigenvalue_curves import SHARP
+from rodfem.continuation.kinds import FLUTTER, FOLD
 from rodfem.continuation.normal_form import Origin, normal_form_of
 from rodfem.continuation.singular import SingularSystem
-from rodfem.errors import ConvergenceError, InputError, SceneError
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.shape import halved
 from rodfem.fem.state import line
 from rodfem.output.words import number
 from rodfem.problem.functions import derived
+from rodfem.stability.cluster import Cluster
 from rodfem.tolerances import TINY, round_off, unit
 
+OnMesh = Callable[[PETSc.Vec], PETSc.Vec]
 PIECES = 4
 """Pieces of each element on which a density is known."""
-ROUNDED = 1e-9  # round-off of the differences, relative
+ROUNDED = 1e-9  # round-off, relative
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,22 +79,36 @@ class Derivative:
 def derivative(special: SpecialPoint, parameter: str, *, along_the_rod: bool = False) -> Derivative:
     """How fast the load of a ``special`` point changes with a ``parameter`` of the scene; collective.
 
-    Raises :class:`InputError` for what has no locus, or no density, and :class:`ConvergenceError` where the parameter
+    Raises :class:`InputError` for what has no locus, and :class:`ConvergenceError` where the parameter
     destroys the point, which then has no derivative.
     """
     solver = special.point.own_solver
     solver.system.scene.check_constant(parameter)
-    if along_the_rod and not special.kind.singular:
-        raise InputError(f"A density along the rod is known at folds and branch points, not at {special.kind.words}.")
     check_special(solver, special)
-    if not special.kind.singular:
-        return _on_locus(solver, special, parameter)
+
+    def of(adjoint: Adjoint, pieces: int) -> Found:
+        return adjoint.splitting(parameter), adjoint.density(parameter, pieces) if pieces else []
+
     with solver.system.clock.scope("locus"), restoration(solver.system):
-        adjoint = adjoint_of(special)
-        splitting = adjoint.splitting(parameter)
-        along = adjoint.density(parameter, PIECES) if along_the_rod else ()
+        own = derived(special, Adjoint, lambda: Adjoint(solver, special.point.x, _near(special, solver)))
+        found = of(own, PIECES * along_the_rod)
+    return _derivative(solver, found, lambda pieces: of(derived(special, "richer", lambda: _richer(special)), pieces))
+
+
+def _derivative(solver: BranchSolver, found: Found, again: Callable[[int], Found]) -> Derivative:
+    """Derivative that was found on the mesh of a solver, with what bounds its errors by that of a richer mesh."""
+    (splitting, along), rho = found, halved(solver.system.fields.discretization.degree)
     value = float(np.trace(splitting)) / len(splitting)
-    return Derivative(value, partial(_bounds, special, parameter, value, along), splitting, *along)
+
+    def bounds() -> tuple[float, float]:
+        with solver.system.clock.scope("error bars"):
+            other, finer = again(PIECES // 2 if along else 0)
+        error = bound(value, float(np.trace(other)) / len(other), ROUNDED * abs(value), rho)
+        if not (along and finer):
+            return error, float("nan")
+        return error, bound(0.0, abs(finer[1] - along[1]).max(), ROUNDED * abs(along[1]).max(), rho)
+
+    return Derivative(value, bounds, splitting, *along)
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,32 +154,15 @@ def _deviation(special: SpecialPoint, name: str, size: float, length: float) -> 
     return size * float(np.sqrt(parts @ np.exp(-abs(middles[:, None] - middles) / length) @ parts))
 
 
-def adjoint_of(special: SpecialPoint) -> Adjoint:
-    """Adjoint solutions of a special point, solved for once."""
-    modes, solver = [*special.null_vectors, *special.nearby], special.point.own_solver
-    return derived(special, Adjoint, lambda: Adjoint(solver, special.point.x, _states(solver, special, modes)))
-
-
-def _states(solver: BranchSolver, special: SpecialPoint, modes: Sequence[PETSc.Vec]) -> SingularSystem:
-    """Equations of a special point on a mesh, with ``modes`` near its own there."""
-    return SingularSystem(solver, modes, special.multiplicity, fold=special.kind == FOLD)
-
-
-def _bounds(
-    special: SpecialPoint, parameter: str, value: float, along: tuple[np.ndarray, np.ndarray] | tuple[()]
-) -> tuple[float, float]:
-    """Bounds of the errors of a derivative and of its density, by the same point of a richer mesh."""
-    solver = special.point.own_solver
-    rho = halved(solver.system.fields.discretization.degree)
-    with solver.system.clock.scope("error bars"):
-        richer = derived(special, "richer", lambda: _richer(special))
-        with restoration(richer.system):
-            again = richer.splitting(parameter)
-            error = bound(value, float(np.trace(again)) / len(again), ROUNDED * abs(value), rho)
-            if not along:
-                return error, float("nan")
-            finer, first = richer.density(parameter, PIECES // 2)[1], along[1]
-    return error, bound(0.0, abs(finer - first).max(), ROUNDED * abs(first).max(), rho)
+def _near(special: SpecialPoint, solver: BranchSolver, on: OnMesh = PETSc.Vec.copy) -> SingularSystem | Cluster:
+    """Equations of a special point ``on`` the mesh of a solver, with modes near its own there, or its cluster."""
+    modes, left, count = modes_of(special.point.own_solver, special, special.point.x)
+    modes, left = ([on(v) for v in side] for side in (modes, left))
+    if special.cluster is not None and special.kind == FLUTTER:
+        return Cluster(np.array([v.array_r.real for v in modes]).T, special.cluster.mean)
+    states = SingularSystem(solver, modes, count, fold=special.kind == FOLD)
+    states.border(modes, left)
+    return states
 
 
 def richer_mesh(solver: BranchSolver) -> Enriched:
@@ -175,46 +173,19 @@ def richer_mesh(solver: BranchSolver) -> Enriched:
 def _richer(special: SpecialPoint) -> Adjoint:
     """Adjoint solutions at the same special point of the richer mesh; raises :class:`ConvergenceError`."""
     richer = richer_mesh(special.point.own_solver)
-    modes = [richer.transfer(v, state=False) for v in (*special.null_vectors, *special.nearby)]
-    found = _states(richer.solver, special, modes).solve(richer.transfer(special.point.x, state=True))
-    if found is None:
-        raise ConvergenceError("The richer mesh does not have this special point: use more elements.")
-    modes[: special.multiplicity] = found.vectors
-    return Adjoint(richer.solver, found.x, _states(richer.solver, special, modes))
-
-
-def _plane(solver: BranchSolver, parameter: str, load: float) -> Plane:
-    """Plane of the load and a parameter near its value, to one side where the scene has no rod on the other."""
-    known = solver.system.scene.parameters[parameter]
-    value = known.value
-    near, own = 0.05 * unit(load, one=solver.units.load), 0.05 * (abs(value) or 1.0)
-    a, b = (min(own, 0.5 * abs(end - value)) for end in known.admissible)
-    trouble = SceneError(f"{parameter} = {value:g} is the only value that is admissible: it has no derivative.")
-    for low, high in ((a, b), (0.0, b), (a, 0.0)):
-        try:
-            return Plane(solver.system, parameter, ((load - near, load + near), (value - low, value + high)))
-        except SceneError as refused:
-            trouble = refused
-    raise trouble
-
-
-def _on_locus(solver: BranchSolver, special: SpecialPoint, parameter: str) -> Derivative:
-    """Derivative of a flutter or a divergence load: the slope of its locus."""
-    plane = _plane(solver, parameter, special.point.load)
-    with solver.system.clock.scope("locus"), restoration(solver.system):
-        curve = Curve(solver, special, plane, doubtful=False)
-    node = curve.first
-    if node.ended:
-        raise ConvergenceError(f"The {special.kind} at {plane.words(node.p)} has no derivative: {node.ended}.")
-    value = float(node.dp[0] / node.dp[1])
-
-    def bounds() -> tuple[float, float]:
-        with solver.system.clock.scope("error bars"), restoration(solver.system):
-            richer = RicherMesh(curve.criterion, special.kind, node)
-            dp = richer.solve(node).dp
-            return bound(value, float(dp[0] / dp[1]), ROUNDED * abs(value), richer.rho), float("nan")
-
-    return Derivative(value, bounds)
+    x = richer.transfer(special.point.x, state=True)
+    near, load = _near(special, richer.solver, partial(richer.transfer, state=False)), special.point.load
+    found = near.solve(x) if isinstance(near, SingularSystem) else None
+    if found is not None:
+        return Adjoint(richer.solver, found.x, near)
+    for _ in range(8 if isinstance(near, Cluster) else 0):
+        x, _ = richer.solver.at_load(x, load)
+        adjoint = Adjoint(richer.solver, x, near)
+        off = adjoint.left / adjoint.rates.item()
+        load -= off
+        if abs(off) < SHARP * unit(load, one=richer.solver.units.load):
+            return adjoint
+    raise ConvergenceError("The richer mesh does not have this special point: use more elements.")
 
 
 # --- of a normal form
@@ -251,29 +222,19 @@ def coefficient_derivative(special: SpecialPoint, parameter: str) -> Derivative:
 def ordinate_derivative(point: Point, parameter: str, *, along_the_rod: bool = False) -> Derivative:
     """How fast the ordinate of an equilibrium changes with a ``parameter``, at its load; collective.
 
-    Raises :class:`InputError` for what is no constant, or has no density, and :class:`ConvergenceError` where the state
+    Raises :class:`InputError` for what is no constant, and :class:`ConvergenceError` where the state
     is singular.
     """
     solver = point.own_solver
     solver.system.scene.check_constant(parameter)
-    if along_the_rod and not solver.conservative:
-        raise InputError("A density of an ordinate along the rod is known under loads with a potential: leave it out.")
-    value = _of_ordinate(solver, point.x, parameter)
-    along = ordinate_density(solver, point.x, parameter, PIECES) if along_the_rod else ()
 
-    def bounds() -> tuple[float, float]:
-        richer, rho = richer_mesh(solver), halved(solver.system.fields.discretization.degree)
+    def of(own: BranchSolver, x: PETSc.Vec, pieces: int) -> Found:
+        slope = state_derivative(own, x, parameter, lambda y: np.array([[own.shape.ordinate(y)]]))
+        return slope, ordinate_density(own, x, parameter, pieces) if pieces else []
+
+    def again(pieces: int) -> Found:
+        richer = richer_mesh(solver)
         x, outcome = richer.solver.at_load(richer.transfer(point.x, state=True), point.load)
-        if not outcome.converged:
-            return float("inf"), float("nan")
-        error = bound(value, _of_ordinate(richer.solver, x, parameter), ROUNDED * abs(value), rho)
-        if not along:
-            return error, float("nan")
-        finer, first = ordinate_density(richer.solver, x, parameter, PIECES // 2)[1], along[1]
-        return error, bound(0.0, abs(finer - first).max(), ROUNDED * abs(first).max(), rho)
+        return of(richer.solver, x, pieces) if outcome.converged else (np.array([[np.inf]]), [])
 
-    return Derivative(value, bounds, np.zeros((0, 0)), *along)
-
-
-def _of_ordinate(solver: BranchSolver, x: PETSc.Vec, parameter: str) -> float:
-    return float(state_derivative(solver, x, parameter, lambda y: np.array([solver.shape.ordinate(y)]))[0])
+    return _derivative(solver, of(solver, point.x, PIECES * along_the_rod), again)

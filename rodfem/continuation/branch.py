@@ -171,9 +171,8 @@ class Point:
     def derivative(self, parameter: str, *, along_the_rod: bool = False) -> Derivative:
         """Derivative of the ordinate in a ``parameter`` at this load: ``.value`` and ``.error``; collective.
 
-        ``along_the_rod``, under loads with a potential, a ``.density``, of a parameter that varies.  Raises
-        :class:`~rodfem.errors.InputError` for what has none, and :class:`~rodfem.errors.ConvergenceError` where the
-        state is singular.
+        ``along_the_rod`` a ``.density``, of a parameter that varies.  Raises :class:`~rodfem.errors.InputError` for
+        what has none, and :class:`~rodfem.errors.ConvergenceError` where the state is singular.
         """
         return Point.sensitivity().ordinate_derivative(self, parameter, along_the_rod=along_the_rod)
 
@@ -285,8 +284,8 @@ class SpecialPoint:
     def derivative(self, parameter: str, *, along_the_rod: bool = False) -> Derivative:
         """Derivative of its load in a ``parameter``: how much stiffer, how much later it buckles; collective.
 
-        ``.value``, and ``.error``, which is computed when it is asked for; ``along_the_rod`` at folds and branch points
-        a ``.density``, of a parameter that varies.  Raises :class:`~rodfem.errors.InputError` for what has none, and
+        ``.value``, and ``.error``, which is computed when it is asked for; ``along_the_rod`` a ``.density``, of a
+        parameter that varies.  Raises :class:`~rodfem.errors.InputError` for what has none, and
         :class:`~rodfem.errors.ConvergenceError` where the parameter takes the special point apart.
         """
         return Point.sensitivity().derivative(self, parameter, along_the_rod=along_the_rod)

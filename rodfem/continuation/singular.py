@@ -188,10 +188,10 @@ class SingularSystem:
         orthonormalize(own, self.inertia.metric)
         return [self.inertia.metric * v for v in own]
 
-    def relaxed(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[PETSc.Vec]]:
-        """Modes of the border and left ones, relaxed at a state: a step of inverse iteration."""
-        _, sides, *_ = self._modes(self.inertia.at(x).matrix)
-        return sides[0], sides[-1]
+    def relaxed(self, x: PETSc.Vec) -> tuple[list[PETSc.Vec], list[PETSc.Vec], np.ndarray, Bordered]:
+        """Modes of the border, left ones and G, by inverse iteration; factors of the transposed equations."""
+        _, sides, G, _ = self._modes(self.inertia.at(x).matrix)
+        return sides[0], sides[-1], G, self._bordered[-1]
 
     def solve(self, x: PETSc.Vec, section: Section | None = None) -> SingularState | None:
         """Newton's method from a state, on a curve in a ``section`` across it; None without a solution near by."""

@@ -34,8 +34,9 @@ typedef struct {
 
 typedef struct {
     int rank, size;      /* of its tensor; degrees of freedom of a cell */
-    int own;             /* values of the unknown that its kernels read: size, or 0 */
-    int integrals;
+    int functions;       /* that its kernels read, of those whose values are given one after the other */
+    const int *function; /* their numbers: 0 is the unknown, of which all others are changes */
+    int integrals, locals; /* number of integrals; of values of a function */
     const Integral *integral;
     const double *x;     /* coordinates, cells x 2 x 3 */
     const int *dofs;     /* cells x size */
@@ -43,7 +44,7 @@ typedef struct {
     const double *table; /* cells x tables */
     const Path *path;
     double *piece;       /* room: pieces */
-    double *tensor, *w;  /* room: (2 size)^rank, 2 (size + tables + pieces) */
+    double *tensor, *w;  /* room: (2 size)^rank, 2 (functions size + tables + pieces) */
 } Form;
 
 typedef struct {
@@ -86,8 +87,9 @@ static const double *tensor_of(const Form *form, const Integral *integral, const
     for (int side = 0; side < sides; side++) {
         int cell = entity[2 * side];
         const int *dofs = form->dofs + (size_t)cell * n;
-        double *to = form->w + sides * form->own + side * known;
-        for (int i = 0; i < form->own; i++) form->w[side * n + i] = u[dofs[i]];
+        double *to = form->w + sides * form->functions * n + side * known;
+        for (int f = 0; f < form->functions; f++) for (int i = 0; i < n; i++)
+            form->w[(f * sides + side) * n + i] = u[form->function[f] * form->locals + dofs[i]];
         memcpy(to, form->table + (size_t)cell * form->tables, form->tables * sizeof(double));
         memcpy(to + form->tables, form->piece, form->pieces * sizeof(double));
         memcpy(coordinates + 6 * side, form->x + (size_t)cell * 6, 6 * sizeof(double));
@@ -118,10 +120,8 @@ PUBLIC int assemble(const Form *form, const Places *places, const double *u, con
             if (form->rank == 0) { out[0] += a[0]; continue; }
             size_t cell = entity[0];
             const int *row = places->row + cell * n;
-            if (form->rank == 1) {
-                for (int i = 0; i < n; i++) if (row[i] >= 0) out[row[i]] += a[i];
-                continue;
-            }
+            for (int i = 0; i < n && form->rank == 1; i++) if (row[i] >= 0) out[row[i]] += a[i];
+            if (form->rank == 1) continue;
             const int *kind = places->kind + cell * n, *column = places->column + cell * places->kinds * n;
             for (int i = 0; i < n; i++) {
                 if (row[i] < 0) continue;

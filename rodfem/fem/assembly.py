@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from rodfem.fem.known import TableFunctions
 
 
+FUNCTIONS = ("unknown", "y", "w", "v", "m")
+"""Names of functions that compiled forms read: the unknown, and changes of it."""
 ONE_CELL = "A term at a point inside the rod must be evaluated in one of the two cells there."
 
 
@@ -101,11 +103,13 @@ class Assembler:
         sides = 1 + any(x.kind == compat.INTERIOR for x in integrals)
         pieces = sum(rows.shape[1] for rows in known.rows)
         tables, names = known.along.shape[1], compat.coefficients(form)
+        functions = np.flatnonzero(np.isin(FUNCTIONS, names)).astype(np.int32)
         arrays = {
             "x": cells.x,
             "dofs": cells.dofs,
             "tensor": np.zeros((sides * size) ** form.rank),
-            "w": np.zeros(sides * (size + tables + pieces)),
+            "w": np.zeros(sides * (len(functions) * size + tables + pieces)),
+            "function": functions,
             "table": known.along,
             "piece": np.zeros(pieces),
         }
@@ -114,7 +118,7 @@ class Assembler:
         for c, rows, line in zip(paths, known.rows, known.lines, strict=True):
             c.dof, (c.pieces, c.size) = load, rows.shape
             memory.point(c, line=line, rows=rows)
-        numbers = {"rank": form.rank, "size": size, "own": size * (names != [known.name]), "integrals": len(integrals)}
+        numbers = {"rank": form.rank, "size": size, "functions": len(functions), "integrals": len(integrals)}
         numbers |= {"integral": held, "tables": tables, "paths": len(known.rows), "pieces": pieces, "path": paths}
         self.pointer = ffi.new("Form *", numbers | pointers)
         self.functions = addresses(self._code, "assemble", "multiply")
@@ -125,8 +129,11 @@ class Assembler:
         self.constants = np.ascontiguousarray(compat.pack_constants(self.form), dtype=float)
 
     def add(self, values: np.ndarray, places: Places | None, out: np.ndarray) -> None:
-        """Add the form at the local ``values`` of the unknown to ``out``, where ``places`` say (None: a scalar)."""
-        ffi = self._code.ffi
+        """Add the form at the local ``values`` of the unknown to ``out``, where ``places`` say (None: a scalar).
+
+        Of a form that reads other :data:`FUNCTIONS` the ``values`` have a row for each of them.
+        """
+        ffi, self.pointer.locals = self._code.ffi, values.shape[-1]
         target = ffi.NULL if places is None else places.pointer
         given = (buffer(ffi, x) for x in (values, self.constants, out))
         failed = self._code.lib.assemble(self.pointer, target, *given)

@@ -136,8 +136,8 @@ class Pieces:
 
     The pieces of several cuts, with the given numbers of pieces each, come one cut after the other.
 
-    ``dofs`` (cells, n) are local degrees of freedom, and ``rows`` says which of these n each field has.  The rule of an
-    element has as many ``points``, and a ``number`` of pieces makes a rule of :data:`POINTS`.
+    ``dofs`` (cells, n) are local degrees of freedom; ``rows`` says which of these n each field has, ``load`` which the
+    load is.  The rule of an element has as many ``points``, and a ``number`` of pieces makes a rule of :data:`POINTS`.
     """
 
     def __init__(self, equations: Equations) -> None:
@@ -149,13 +149,13 @@ class Pieces:
         d = self.fields.discretization
         self.points = self.equations.quadrature_degree(d.degree) // 2 + 1
         self.number = max(LEAST, 2 ** round(np.log2(POINTS / d.elements / self.points)))
-        self._load = numbers[int(self.fields.copies[0, -1])]
+        self.load = numbers[int(self.fields.copies[0, -1])]
         self._cells, self._bases = cache(self._cut), cache(self._tabulated)
         self._places = cache(lambda *cuts: Places(self._cells(*cuts).dofs))
         self._form = cache(self._assembler)
 
     def vectors(self, form: Assembler, values: np.ndarray, *cuts: int) -> np.ndarray:
-        """A linear form, whose parameters have been taken, where the unknown has these ``values`` (cells, n)."""
+        """A linear form, whose parameters have been taken, at ``values`` (cells, n), or (functions, cells, n)."""
         return self._assembled(form, values, cuts, self._places(*cuts))
 
     def rigid(self, form: Assembler, values: np.ndarray, *cuts: int) -> np.ndarray:
@@ -168,19 +168,24 @@ class Pieces:
 
     def _assembler(self, form: Assembler, *cuts: int) -> Assembler:
         cells = self._cells(*cuts)
-        load = int(cells.dofs[0, self._load])
+        load = int(cells.dofs[0, self.load])
         return Assembler(form.form, cells, self.equations.known.cut(*cuts), load, inside=True)
 
     def _assembled(self, form: Assembler, values: np.ndarray, cuts: tuple[int, ...], places: Places) -> np.ndarray:
         mine, bases = self._form(form, *cuts), self._bases(*cuts)
-        local = [values[:, rows].reshape(-1, rows.shape[1]) @ basis.swapaxes(1, 2) for rows, basis in bases]
-        out, whole = np.zeros(sum(cuts) * values.size), np.empty((sum(cuts), *values.shape))
+        sizes = [sum(cuts) * len(self.dofs) * rows.size for rows, _ in bases]
+        out, whole = np.zeros(sum(sizes)), np.empty((sum(cuts), *self.dofs.shape))
         mine.constants = form.constants
-        mine.add(np.concatenate([part.ravel() for part in local]), places, out)
-        parts = np.split(out, np.cumsum([part.size for part in local])[:-1])
-        for (rows, basis), part, like in zip(bases, parts, local, strict=True):
-            whole[..., rows] = (part.reshape(like.shape) @ basis).reshape(-1, len(values), *rows.shape)
+        mine.add(np.array([self._cut_up(each, bases) for each in values.reshape(-1, *self.dofs.shape)]), places, out)
+        for (rows, basis), part in zip(bases, np.split(out, np.cumsum(sizes)[:-1]), strict=True):
+            shape = len(basis), -1, rows.shape[1]
+            whole[..., rows] = (part.reshape(shape) @ basis).reshape(-1, len(self.dofs), *rows.shape)
         return whole
+
+    def _cut_up(self, values: np.ndarray, bases: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+        """Values at the nodes of all pieces, in their order, by those of a function (cells, n)."""
+        parts = (values[:, rows].reshape(-1, rows.shape[1]) @ basis.swapaxes(1, 2) for rows, basis in bases)
+        return np.concatenate([part.ravel() for part in parts])
 
     def _cut(self, *cuts: int) -> Cells:
         """All pieces: their values are by field, piece, cell and component, and those of the nodes side by side."""

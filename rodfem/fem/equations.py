@@ -118,7 +118,24 @@ class Equations:
             others |= fields.formulation.dead_forces(self, along, dx)
         others |= self._ordinate(along, dx)
         derivatives = {"jacobian": ufl.derivative(first, u, trial), "residual": first}
-        return derivatives | {name: self.compilable(x) for name, x in others.items()}
+        self._forms = derivatives | {name: self.compilable(x) for name, x in others.items()}
+        return self._forms
+
+    @property
+    def adjoint(self) -> Assembler:
+        """Derivative of ``y.F + w.S v - w.M m`` in the unknown, a linear form, compiled once, when it is asked for."""
+        return derived(self, "adjoint", self._adjoint)
+
+    def _adjoint(self) -> Assembler:
+        y, w, v, m = self.fields.changes
+        one, two, mass = (self._forms[name] for name in ("residual", "jacobian", "kinetic"))
+        form = ufl.action(one, y) + ufl.action(ufl.action(two, v), w)
+        form -= 0 if self.massless else ufl.action(ufl.action(mass, m), w)
+        derivative = ufl.derivative(form, self.fields.u, ufl.TestFunction(self.fields.space))
+        (compiled,) = form_compiler.compile_forms([derivative], self.fields.comm)
+        self._assemblers.append(Assembler(compiled, self.cells, self.known, int(self.fields.copies[0, -1])))
+        self._assemblers[-1].pack_constants()
+        return self._assemblers[-1]
 
     def _ordinate(self, along: Place, dx: Any) -> dict[str, Any]:
         """Ordinate of a scene that has an integral for one."""

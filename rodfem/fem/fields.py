@@ -21,6 +21,7 @@ from mpi4py import MPI
 from rodfem import compat
 from rodfem.errors import InputError
 from rodfem.fem import formulations
+from rodfem.fem.assembly import FUNCTIONS
 from rodfem.fem.formulations import CONTACT_FORCE, Formulation, turning_of
 from rodfem.fem.state import LOAD
 from rodfem.linalg.chain import Chain, Factors
@@ -169,7 +170,7 @@ class Fields:
         self.mesh = self._mesh()
         parts = [(b.continuous, b.degree, b.size) for b in self.blocks] + [(False, 0, len(names))]
         self.space = compat.mixed_space(self.mesh, parts)
-        self.u = compat.fem.Function(self.space, dtype=compat.REAL)
+        self.u, *self.changes = (compat.fem.Function(self.space, name=x, dtype=compat.REAL) for x in FUNCTIONS)
         cells = self.mesh.topology.index_map(1)
         self.owned_cells, local_cells = cells.size_local, cells.size_local + cells.num_ghosts
         self.vertices = compat.cell_vertices(self.mesh, local_cells)

@@ -7,7 +7,7 @@ writes there: an evaluation puts its own values there first, unless they are the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -182,9 +182,7 @@ class State(NodalValues):
                     self._add(self.equations.residual, places, array)
                     array[system.load_index] = 0.0
             else:
-                values = self.covector()[system.equation_targets]
-                out.setValues(system.equation_numbers, values, addv=PETSc.InsertMode.ADD_VALUES)
-                out.assemble()
+                system.add_up(self.covector(), out)
             for i, value in enumerate(self.drifts.tolist()):
                 if i in system.phase.conditions:
                     out.axpy(value, system.phase.pushes[i])
@@ -194,6 +192,19 @@ class State(NodalValues):
                 if system.has_scalars:
                     out.setValue(system.drifts[i], value)
                 out.assemble()
+
+    def with_changes(self, changes: Sequence[PETSc.Vec | None]) -> np.ndarray:
+        """Local values of the state, then of changes y, w, v, m of it, None for zero: (5, local size)."""
+        zero = np.zeros(len(self.local))
+        return np.array([self.local, *(zero if d is None else self.system.change(d).local for d in changes)])
+
+    def adjoint(self, changes: Sequence[PETSc.Vec | None]) -> np.ndarray:
+        """Derivative of ``y.F + w.S v - w.M m`` in the state, on this rank (local size,), without phase conditions."""
+        out, form = np.zeros(len(self.local)), self.equations.adjoint
+        with self.system.clock("assembly"):
+            self.equations.take(self.line)
+            form.add(self.with_changes(changes), self.equations.local_places, out)
+        return out
 
     def jacobian(self, row: PETSc.Vec) -> PETSc.Mat:
         """Jacobian into the system's matrix, with ``row`` as the row of the load."""

@@ -233,6 +233,11 @@ class System:
         scalars = [local[f.copies[0]], drifts] if self.has_scalars else []
         return self.new_vector(np.concatenate([local[f.free_owned], *scalars]))
 
+    def add_up(self, local: np.ndarray, out: PETSc.Vec) -> None:
+        """Add to a vector of equations what this rank's cells have of them, (local size,), but for the load's."""
+        out.setValues(self.equation_numbers, local[self.equation_targets], addv=PETSc.InsertMode.ADD_VALUES)
+        out.assemble()
+
     # --- assembly ----------------------------------------------------------------------------------------------
 
     def maps(self, load: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from rodfem.continuation.kinds import BRANCH_POINT, CROSSES, KINDS, USER
 from rodfem.file_format import LOCUS
 from rodfem.output.style import FONT, HALO, PALETTE, STYLE, axis_name, explain, save, sheet
 from rodfem.output.words import mesh_in_words, rounded_up
-from rodfem.tolerances import TINY
+from rodfem.tolerances import ROUND_OFF, TINY
 
 Floats = NDArray[np.float64]
 Locus = Mapping[str, Any]
@@ -127,7 +127,7 @@ def stable_region(one: Locus, loci: Sequence[Locus]) -> StableRegion | None:
     edge = np.interp(grid, x[order], y[order])
     end = np.full(len(grid), float(one["bounds"][0][int(side > 0)]))
     for level in (level for another in loci if another is not one for level in _levels(*_curve(another), grid)):
-        end = np.where((side * (level - edge) > 0) & (side * (level - end) < 0), level, end)
+        end = np.where((side * (level - edge) > ROUND_OFF * abs(edge)) & (side * (level - end) < 0), level, end)
     return StableRegion(grid, edge, end)
 
 

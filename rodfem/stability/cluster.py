@@ -139,16 +139,13 @@ def real_span(pencil: NonsymmetricPencil, vectors: np.ndarray) -> np.ndarray:
 class ClusterNoise(NamedTuple):
     """Uncertainty of the ``mean`` and of the ``discriminant`` of a cluster by round-off in the matrix.
 
-    ``mean_left`` and ``discriminant_left`` are what the eigensolver left open; ``two_sided`` is ``D`` by both bases,
-    ``two_sided_mean`` the mean.
+    ``mean_left`` and ``discriminant_left`` are what the eigensolver left open.
     """
 
     mean: float
     discriminant: float
     mean_left: float
     discriminant_left: float
-    two_sided: float
-    two_sided_mean: float
 
     @property
     def of_mean(self) -> float:
@@ -161,17 +158,35 @@ class ClusterNoise(NamedTuple):
         return self.discriminant + DRAWN * self.discriminant_left
 
 
-def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
-    """Uncertainties of a cluster by round-off; :class:`ConvergenceError` if its left vectors are not found."""
-    V, size, mean = measured.cluster.basis, measured.cluster.size, measured.cluster.mean
-    found, chosen = members(pencil, V, measured.cluster, left=True)
+def both_sides(pencil: NonsymmetricPencil, cluster: Cluster) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``V``, ``W`` and ``W^t S V`` of a cluster; :class:`ConvergenceError` if its left vectors are not found."""
+    V, size = cluster.basis, cluster.size
+    found, chosen = members(pencil, V, cluster, left=True)
     W = real_span(pencil, found.vectors[:, chosen])
     product = pencil.product(W, pencil.weighed(V))
     if np.linalg.matrix_rank(product) < size:
-        raise ConvergenceError(f"the left vectors of {size} eigenvalues near {mean:.6g} are not found")
+        raise ConvergenceError(f"the left vectors of {size} eigenvalues near {cluster.mean:.6g} are not found")
     W = W @ np.linalg.inv(product).T
-    rows, every = local_rows(pencil.matrix), pencil.system.whole(V)
-    B = pencil.product(W, (rows @ every).real) - mean * np.eye(size)
+    return V, W, pencil.product(W, (local_rows(pencil.matrix) @ pencil.system.whole(V)).real)
+
+
+def sides(pencil: NonsymmetricPencil, cluster: Cluster) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """``V``, ``W`` and ``W^t S V`` of a cluster known from near by; those that collide span them ill at once."""
+    if pencil.system.scene.inertia.order == 1:
+        return both_sides(pencil, measure(pencil, cluster).cluster)
+    target = cluster.mean - 1e-3 * max(abs(cluster.mean), pencil.system.scene.units.omega2)  # next to it
+    V, W = (pencil.iterated(cluster.basis, target, left=left) for left in (False, True))
+    W = W @ np.linalg.inv(pencil.product(W, pencil.weighed(V))).T
+    A = pencil.product(W, (local_rows(pencil.matrix) @ pencil.system.whole(V)).real)
+    pencil.complete(V, np.linalg.inv(A))
+    return V, W, A
+
+
+def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
+    """Uncertainties of a cluster by round-off; :class:`ConvergenceError` if its left vectors are not found."""
+    size, mean = measured.cluster.size, measured.cluster.mean
+    V, W, A = both_sides(pencil, measured.cluster)
+    rows, every, B = local_rows(pencil.matrix), pencil.system.whole(V), A - mean * np.eye(size)
 
     def of(left: np.ndarray) -> float:
         squares = abs(rows.data * np.einsum("ij,ij->i", np.repeat(left, np.diff(rows.indptr), 0), every[rows.indices]))
@@ -181,4 +196,4 @@ def noise_of(pencil: NonsymmetricPencil, measured: Measured) -> ClusterNoise:
     inside = B - off * np.eye(size)
     discriminant = float(np.trace(inside @ inside)) / size
     left = abs(off), abs(discriminant - measured.discriminant)
-    return ClusterNoise(of(W), of(2 * W @ B.T), *left, discriminant, mean + off)
+    return ClusterNoise(of(W), of(2 * W @ B.T), *left)

@@ -43,6 +43,7 @@ FREQUENCIES = 6
 SLOW, SOLVED = 1e-3, 1e-9
 """Part of the natural size below which eigenvalues are slow, and what a state leaves open of them."""
 
+ITERATIONS = 12
 LITTLE = 1e-6
 """Inertia, relative to the mass, that makes all eigenvalues finite."""
 
@@ -278,24 +279,38 @@ class NonsymmetricPencil:
             values, vectors = values * units.omega2, vectors * self.solver.sizes.array_r.real[:, None]
         if free and not left:
             vectors = vectors.astype(complex)
-            self._complete(values, vectors)
+            moving = abs(values) > REAL * self._one
+            self.complete(vectors, np.diag(np.where(moving, 1.0 / np.where(moving, values, 1.0), 0.0)))
         weighed = self.weighed(vectors) if weighed is None else weighed
         return Frequencies(values, pairs.error, (), vectors, weighed, units.omega2, self.solver.floating)
 
-    def _complete(self, values: np.ndarray, vectors: np.ndarray) -> None:
-        """Add to vectors, in place, their parts along free motions ``g``: ``g . S x / mu``, of ``g . Mx = 0`` before.
+    def complete(self, vectors: np.ndarray, inverse: np.ndarray) -> None:
+        """Add to ``S X = M X A``, in place, parts along free motions ``g``, ``g . S X A^-1``; of ``g . MX = 0`` before.
 
-        From ``S (x + c g) = mu M (x + c g)``, with ``S g = 0``.  Where ``mu`` is zero to round-off none is taken.
+        From ``S (X + g c) = M (X + g c) A``, with ``S g = 0``.  Where an eigenvalue is zero to round-off none is taken.
         """
         begin, end = self.matrix.getOwnershipRange()
         drifts = [index - begin for index in self.system.drifts if begin <= index < end]
-        moving = abs(values) > REAL * self._one
         for mode in self.solver.free:
             force = mode.duplicate()
             self.matrix.multTranspose(mode, force)
             force.array[drifts] = 0.0
             work = self.system.comm.allreduce(force.array_r.real @ vectors)
-            vectors[:, moving] += np.outer(mode.array_r.real, work[moving] / values[moving])
+            vectors += np.outer(mode.array_r.real, work @ inverse)
+
+    def iterated(self, basis: np.ndarray, target: float, *, left: bool) -> np.ndarray:
+        """Basis (n, k) of the right or ``left`` subspace of the eigenvalues nearest to ``target``, by one near it.
+
+        Inverse iteration of all vectors at once does not mind that eigenvectors become one.
+        """
+        found, sizes = self.inverse(target), self.solver.sizes.array_r.real[:, None]
+        first, last, solve = found.lower, found.dual, found.solve
+        if left:
+            first, last, solve = found.dual, found.lower, found.solve_transposed
+        x = self.system.whole(basis / sizes)
+        for _ in range(ITERATIONS):
+            x = solve(found.spread(np.linalg.qr(last.T @ x[found.heavy])[0], first))
+        return np.asarray(x[self._own] * sizes)
 
     def shares(self, basis: np.ndarray) -> np.ndarray:
         """Share (k,) of the vector of each eigenvalue of the spectrum in the span of a real ``basis`` (n, m)."""

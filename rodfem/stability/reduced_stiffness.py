@@ -68,7 +68,8 @@ class Bordered:
         """Factor with a matrix of the same pattern; its negative eigenvalues off the borders, -1 without a count."""
         values = self._rows.data
         values[: self.own][~self._border] = local_rows(matrix).data.real
-        local = [np.stack([v.array_r.real for v in side], axis=1) for side in (columns, rows or columns)]
+        size, sides = (self.k, matrix.getLocalSize()[0]), (columns, rows or columns)
+        local = [np.reshape([v.array_r.real for v in side], size).T for side in sides]
         values[: self.own][self._border] = local[0].ravel()
         parts = self.comm.gather(local[1], root=self.comm.size - 1)
         if parts is not None:

@@ -7,7 +7,7 @@ from golden_cases import NOT_CONSERVATIVE, cases, distinct, trace
 
 import rodfem
 from rodfem import Diagram, Plan, Point, SpecialPoint
-from rodfem.codim2.criteria import restoration
+from rodfem.codim2.adjoint import restoration
 from rodfem.codim2.neighbours import Neighbours
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER
 from rodfem.errors import ConvergenceError

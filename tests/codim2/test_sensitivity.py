@@ -1,22 +1,30 @@
 """Derivatives of critical loads, against closed forms and loads of other rods located."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import classics
 import demo_cases
 import hemitropic_cases
 import numpy as np
 import pytest
+import ufl
+from closed_forms import double
+from literature.test_viscous import FILAMENT, flutters
 
 import rodfem
-from rodfem import Ordinate, Parameter, Plan, Scene, clamped, free, pinned, sliding
+from rodfem import Discretization, Inertia, Ordinate, Parameter, Plan, Scene, clamped, free, pinned, sliding
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.forms.energy import bending_and_twist
 
 PLAN = Plan(depth=0, error_bars=False)
+DIFFERENCE = np.array([1.0, -8.0, 8.0, -1.0]) / 12
+"""Weights of a central difference of the fourth order."""
 
 
 def column(push: float = 0.0) -> Scene:
@@ -51,7 +59,7 @@ def test_of_a_column_and_along_it() -> None:
         assert abs(special.derivative(other).value) < 1e-12
     with pytest.raises(ConvergenceError, match="has no derivative: H is an imperfection"):
         diagram.special("branch point")[0].derivative("H")
-    with pytest.raises(InputError, match="not at"):
+    with pytest.raises(InputError, match="has no locus"):
         diagram.special("end")[0].derivative("A", along_the_rod=True)
 
 
@@ -181,6 +189,90 @@ def test_of_an_ordinate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     value, error = asked.special("user")[0].derivatives["K"]
     assert abs(abs(value) - abs(slope)) <= error < 1e-7
     assert "How fast the deflection at a load changes" in capsys.readouterr().out
+
+
+def means(of: Callable[[np.ndarray], np.ndarray], ends: np.ndarray) -> np.ndarray:
+    """Means (m,) of a function between ``ends`` (m + 1,)."""
+    x, w = np.polynomial.legendre.leggauss(10)
+    return of((ends[:-1] + ends[1:])[:, None] / 2 + np.diff(ends)[:, None] / 2 * x) @ w / 2
+
+
+def test_of_flutter_along_the_rod() -> None:
+    """Beck's column: ``-u'' w'' / int u'' w``, and of the mass ``mu u w / int u'' w``, by ``u`` and the adjoint ``w``.
+
+    Both solve ``f_ssss + P f_ss = mu f`` and are zero with their slope at the clamp; at the tip ``u_ss = u_sss = 0``,
+    and ``w_ss + P w = w_sss + P w_s = 0``.
+    """
+    (special,) = rodfem.trace(demo_cases.scene("follower")).special("flutter")
+    P, mu = double(20.0, 120.0)
+    a, b = (np.sqrt((np.sqrt(P**2 + 4 * mu) + sign * P) / 2) for sign in (-1, 1))
+
+    def motion(load: float) -> tuple[Callable[[np.ndarray], np.ndarray], Callable[[np.ndarray], np.ndarray]]:
+        """A motion with ``f_ss + load f = 0`` at the tip, and its second derivative."""
+        one, two = load + a**2, load - b**2
+        share = (one * np.cosh(a) - two * np.cos(b)) / (one * np.sinh(a) / a - two * np.sin(b) / b)
+
+        def of(s: np.ndarray, grows: float = 1.0, waves: float = 1.0) -> np.ndarray:
+            waves = waves * (share * np.sin(b * s) / b - np.cos(b * s))
+            return grows * (np.cosh(a * s) - share * np.sinh(a * s) / a) + waves
+
+        return of, partial(of, grows=a**2, waves=-(b**2))
+
+    (u, u2), (w, w2) = motion(0.0), motion(P)
+    (work,) = means(lambda s: u2(s) * w(s), np.array([0.0, 1.0]))
+    for name, exact in (("B1", lambda s: -u2(s) * w2(s) / work), ("m", lambda s: mu * u(s) * w(s) / work)):
+        found = special.derivative(name, along_the_rod=True)
+        assert abs(found.density - means(exact, found.ends)).max() <= found.density_error < 1e-6
+        assert found.density @ np.diff(found.ends) == pytest.approx(found.value, abs=1e-10)
+
+
+def test_of_flutter_to_another_field() -> None:
+    """The difference of the loads of two columns that are stiffer, and softer, between the clamp and the middle."""
+
+    def beck(change: float) -> Scene:
+        def energy(v: Any, k: Any, c: Any) -> Any:
+            return bending_and_twist(k, (c.B1 + ufl.conditional(ufl.lt(c.s, 0.5), c.change, 0.0), 10.0, 1.0))
+
+        constants = {"P": Parameter(19.0), "B1": Parameter(1.0), "change": Parameter(change)}
+        return replace(demo_cases.scene("follower"), energy=energy, parameters=constants, inertia=Inertia(1.0))
+
+    loads = [rodfem.trace(beck(change), plan=PLAN).special("flutter")[0].point.load for change in (-1e-3, 1e-3)]
+    found = rodfem.trace(beck(0.0), plan=PLAN).special("flutter")[0].derivative("B1", along_the_rod=True)
+    assert found.density @ (np.diff(found.ends) * (found.ends[1:] <= 0.5)) == pytest.approx(
+        (loads[1] - loads[0]) / 2e-3, rel=1e-5
+    )
+
+
+@pytest.mark.parametrize("strong", [10.0, 1.0])
+def test_of_divergence(strong: float) -> None:
+    """``cos k = e/(e - 1)``, k = sqrt P, of a share e that follows; along the rod ``sin k (1 - s) cos k s``, times P.
+
+    With one stiffness in both planes two loads vanish at once, each of which depends on that of its own.
+    """
+    rod, e = classics.partly_following(0.2, (0.0, 25.0), strong), 0.2
+    for special in rodfem.trace(rod, Discretization("pointwise", 4, 6)).special("divergence"):
+        P, count = special.point.load, 1 + (strong == 1.0)
+        k = np.sqrt(P)
+        found = special.derivative("share")
+        assert found.value == pytest.approx(2 * k / np.sin(k) / (1 - e) ** 2, rel=1e-10)
+        found = special.derivative("B1", along_the_rod=True)
+        assert sorted(np.linalg.eigvals(found.splitting).real) == pytest.approx([0.0] * (count - 1) + [P], abs=1e-8)
+        exact = means(lambda s, k=k: np.sin(k * (1 - s)) * np.cos(k * s), found.ends)  # type: ignore[misc]
+        exact *= P / count / (exact @ np.diff(found.ends))
+        assert abs(found.density - exact).max() <= found.density_error < 1e-5
+        assert abs(found.value - P / count) <= found.error < 1e-7
+
+
+def test_of_flutter_with_drag() -> None:
+    """A filament in a viscous fluid: differences of the loads by shooting, and the load itself of the stiffness."""
+    (special,) = rodfem.trace(replace(FILAMENT, span=(36.0, 40.0))).special("flutter")
+    load, h = special.point.load, 1e-3
+    found = special.derivative("part")
+    difference = DIFFERENCE @ [flutters(load, 191.25863576525, 1.0 + side * h)[0] for side in (-2, -1, 1, 2)] / h
+    assert abs(found.value - difference) <= found.error + 1e-8 * abs(difference)
+    found = special.derivative("B2", along_the_rod=True)
+    assert abs(found.value - load) <= found.error < 1e-6
+    assert found.density @ np.diff(found.ends) == pytest.approx(load, abs=1e-9)
 
 
 def test_of_flutter_in_the_stiffness(tmp_path: Path) -> None:
