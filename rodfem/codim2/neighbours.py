@@ -31,7 +31,7 @@ from rodfem.codim2.criteria import FEWER
 from rodfem.continuation.branch import Branch, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.kinds import FOLD
-from rodfem.continuation.singular import SingularState, SingularSystem
+from rodfem.continuation.singular import SingularState, SingularSystem, Vectors
 from rodfem.errors import ConvergenceError
 from rodfem.fem.state import load_line
 from rodfem.linalg.orthogonal import combine
@@ -160,22 +160,22 @@ class Rods:
         """Special points of the rod with these ``values``; raises :class:`ConvergenceError` if they are others."""
         bars = [0.0] * len(self.special)
         with restoration(self.system):
-            rod, found = self._found(self.solver, self.known, values, sizes)
+            rod, found, moved = self._found(self.solver, in_line(self.known, values, sizes), values)
             witnesses = self._witnesses(rod, found)
         known = Rod(rod.points, rod.null, witnesses)
         if self.richer is not None:
             with restoration(self.richer.system):
-                finer, again = self._found(self.richer.solver, self.finer, values, sizes)
+                moved = [self.richer.transfer(change, state=False) for change in moved]
+                finer, again, _ = self._found(self.richer.solver, in_line(self.finer, values, sizes), values, moved)
                 bars = [*map(self._bar, found, again)]
             _keep(self.finer, values, finer)
         _keep(self.known, values, known)
         return [*self._data(found, bars)]
 
     def _found(
-        self, solver: BranchSolver, known: Mapping[Place, Rod], values: Place, sizes: np.ndarray
-    ) -> tuple[Rod, list[SingularState]]:
-        """Special points of the rod, and where its witnesses are expected."""
-        rods = in_line(known, values, sizes)
+        self, solver: BranchSolver, rods: Sequence[Rod], values: Place, moved: Vectors = ()
+    ) -> tuple[Rod, list[SingularState], Vectors]:
+        """Special points of the rod by ``rods`` in line, where witnesses are expected, by what guesses are wrong."""
         weights = np.array(WEIGHTS[len(rods) - 1])
         solver.system.line = load_line(solver.system.scene, **dict(zip(self.names, values, strict=True)))
 
@@ -183,10 +183,11 @@ class Rods:
             return [combine([*states], weights) for states in zip(*map(of, rods), strict=True)]
 
         guesses = expected(lambda rod: rod.points)
+        guesses = [x + change for x, change in zip(guesses, moved, strict=True)] if moved else guesses
         found = [self._singular(solver, i, guesses, rods[0].null) for i in range(len(guesses))]
         self._require_order(found)
         rod = Rod([x.x for x in found], [x.vectors for x in found], expected(lambda rod: rod.witnesses))
-        return rod, found
+        return rod, found, [x.x - guess for x, guess in zip(found, guesses, strict=True)]
 
     def _singular(
         self, solver: BranchSolver, i: int, guesses: Sequence[PETSc.Vec], null: Sequence[list[PETSc.Vec]]

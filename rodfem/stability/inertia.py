@@ -26,6 +26,7 @@ from rodfem.fem.newton import compiled_newton
 from rodfem.linalg.chain import Factors
 from rodfem.linalg.matrices import EPS, local_rows, places_in, rounding, shared, times
 from rodfem.linalg.orthogonal import generic
+from rodfem.problem.functions import derived
 from rodfem.tolerances import TINY
 
 if TYPE_CHECKING:
@@ -283,8 +284,9 @@ class Inertia:
 
     def waves(self, count: int) -> list[PETSc.Vec]:
         """Products with the metric of smooth changes of a state, which know no mesh and no ranks."""
-        fields = self.system.fields
-        return [self.metric * self.system.vector(fields.sizes * fields.wave(i)) for i in range(1, count + 1)]
+        fields, vector = self.system.fields, self.system.vector
+        waves = range(1, count + 1)
+        return derived(self, count, lambda: [self.metric * vector(fields.sizes * fields.wave(i)) for i in waves])
 
 
 class Factored:
