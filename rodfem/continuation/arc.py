@@ -418,9 +418,9 @@ class LevelPiece(SoughtPiece):
 
     def node(self, x: PETSc.Vec, tangent: PETSc.Vec, known: Any = None) -> Node:
         """Node at a state with its unit tangent."""
-        below = self.solver.spectrum.at(x).eigenvalue_count(self.event.value / self.solver.units.omega2)
-        speed, none = float(self.row.dot(tangent)), np.zeros((0, 0))
-        return Node(self.place(x), none, none, below, Knot(x, tangent * (1.0 / speed), speed))
+        speed, zeros = float(self.row.dot(tangent)), self.solver.system.active_drifts(x) * (self.event.value > 0)
+        below = zeros + self.solver.spectrum.at(x).eigenvalue_count(self.event.value / self.solver.units.omega2)
+        return Node(self.place(x), np.zeros((0, 0)), np.zeros((0, 0)), below, Knot(x, tangent * (1.0 / speed), speed))
 
     def zeros(self) -> list[Node]:
         """Nodes at which the number changes; raises :class:`ConvergenceError` where an equilibrium is not found."""

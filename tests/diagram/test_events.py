@@ -54,6 +54,14 @@ def test_levels_of_eigenvalues() -> None:
         assert {s.kind for s in points} == {"level"}
 
 
+def test_a_circle_of_states_begins_at_no_level() -> None:
+    """The zero eigenvalue of a turn is below a level, as both are at the branch point; the radial one is 2.3."""
+    rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (9.0, 11.0), constants={"B2": 1.0})
+    found = rodfem.trace(rod, plan=Plan(depth=1, error_bars=False, events=(Level(5.0),)))
+    assert len(found) == 2 and found[1].points[-1].zero == 2
+    assert not found.special("eigenvalue 5")
+
+
 def test_an_event_that_fails_is_named() -> None:
     rod = classics.column("pinned", classics.SUPPORTS["pinned-pinned"], (0.0, 5.0), planar="e1")
     wrong = Plan(depth=0, events=(Event("tip", of=lambda state: state.tip),))
