@@ -138,7 +138,7 @@ class Tracer:
             solver.damp(self.solver.system.damping > 0)
             with self.solver.system.clock.scope("location"):
                 pairs = self.meshes.carry(history, solver, branch.parent is not None)
-            anew = [trouble.point, *history] if len(history) == 1 else [trouble.point]  # its first row alone: it begins anew
+            anew = [trouble.point, *history] if len(history) == 1 else [trouble.point]  # else others stay
             branch.replace({id(old): new for old, new in pairs if any(old is point for point in anew)})
             history = [new for _, new in pairs]
             self.solver = solver
