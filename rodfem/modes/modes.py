@@ -112,15 +112,15 @@ def save_modes(modes: Modes, path: Path, branch: str, row: int, about: Mapping[s
 @checked(path=argument_path("results/column/modes.h5"), branch=text("straight"), row=whole(0, 0))
 def load_modes(path: Path | str, branch: str, row: int) -> Modes:
     """Modes of a saved state; raises :class:`InputError` where the file has none, or has another or a newer format."""
-    unfit = f"{path} has no modes of row {row} of a branch {branch!r} ({{}}): give {MODES.file}."
-    with MODES.opened(path, ("branches",), unfit) as file:
+    unfit = f"{path} has no modes of row {row} of a branch {branch!r}"
+    if (known := rows_with_modes(Path(path))) and (branch, row) not in known:
+        raise InputError(f"{unfit}: it has {', '.join(f'{name}, row {at}' for name, at in known)}.")
+    with MODES.opened(path, ("branches",), f"{unfit} ({{}}): give {MODES.file}.") as file:
         group = file[f"branches/{branch}/{row}"]
-        names = [name for name in Modes.__dataclass_fields__ if name not in ("note", "rates")]
-        arrays = {name: group[name][()] for name in names if name != "motion"}
-        motion, note = tuple(group["motion"].asstr()[()]), str(group.attrs.get("note", ""))
-        rates = bool(group.attrs.get("rates", False))
-    arrays["load"] = float(arrays["load"])
-    return Modes(motion=motion, rates=rates, note=note, **arrays)
+        own: dict[str, Any] = {"load": float(group["load"][()]), "motion": tuple(group["motion"].asstr()[()])}
+        own |= {"note": str(group.attrs.get("note", "")), "rates": bool(group.attrs.get("rates", False))}
+        arrays = {name: group[name][()] for name in Modes.__dataclass_fields__ if name not in own}
+    return Modes(**own, **arrays)
 
 
 def rows_with_modes(path: Path) -> list[tuple[str, int]]:

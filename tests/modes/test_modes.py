@@ -231,7 +231,7 @@ def test_file(folder: Path) -> None:
     assert again.motion == modes.motion
     with pytest.raises(InputError, match="has no modes of row 3 of a branch 'branch 1': it has branch 1, row 7"):
         load_modes(path, "branch 1", 3)
-    with pytest.raises(InputError, match=r"run a scene with Plan.modes=.* and Plan.at="):
+    with pytest.raises(InputError, match=r"No such file.*: give the modes.h5 of a run with Plan.modes="):
         load_modes(folder / "nothing.h5", "branch 1", 3)
 
 
