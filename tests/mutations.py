@@ -282,7 +282,7 @@ TABLE = {
     },
     "rodfem/diagram/tracer.py": {
         "start-anew": (
-            "anew = trouble.point, branch.points[0]  #", "anew = (trouble.point,)  #",
+            "anew = [trouble.point, *history] if len(history) == 1 else [trouble.point]", "anew = [trouble.point]",
             "diagram/test_load_at_an_end.py"),
         "ranges-are-left-and-entered-again": ("        if out is None:", "        if True:", HARD),
         "no-index-before-zero-stretch": (
