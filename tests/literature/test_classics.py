@@ -1,6 +1,7 @@
 """Classical problems of the stability of rods against closed forms, frequency equations and values from literature."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import cos, pi, sin, sqrt, tan
 from typing import Any
 
@@ -15,7 +16,7 @@ from scipy.optimize import brentq, fsolve
 from scipy.special import ellipe, ellipk
 from shooting_solver import Rod
 
-from rodfem import Discretization, End, Plan, Scene, Solver, clamped, free, trace
+from rodfem import Discretization, End, Ordinate, Plan, Ring, Scene, Solver, clamped, free, trace
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 
@@ -394,3 +395,14 @@ def test_torque_about_the_axis_of_a_hinge(kind: str) -> None:
         (0, pytest.approx(4.0)),
         (2, pytest.approx(5.0)),
     ]
+
+
+@pytest.mark.filterwarnings("error")
+def test_where_a_twisted_ring_meets_its_circle_again() -> None:
+    """2 - 2/sqrt(3) by Michell; a twist of round-off alone raises no warning of numpy's."""
+    twist = Ordinate("twist", s=None, of=lambda x, c: x.k[2] / (2 * pi))
+    ring = replace(classics.ring(), span=(0.0, 1.5), ends=Ring(), ordinate=twist)
+    diagram = trace(ring, Discretization(elements=8, degree=6), Plan(depth=1))
+    special = diagram["branch 1"].special[-1]
+    assert special.resolved and not diagram.warnings
+    assert abs(special.point.load - (2 - 2 / sqrt(3))) <= special.error_estimate < 1e-7
