@@ -11,7 +11,7 @@
 #
 # tools/image.py builds the image, runs demos/cord.py in it, and compares each number with the recorded ones.
 
-# Tried without a container: `pip install ".[pip,viz]"` (README). Not tried: another base, with a dolfinx of its own, as
+# Tried without a container: `pip install ".[pip,viz,tables]"` (README). Not tried: another base, with a dolfinx of its own, as
 # the project's images are:
 # docker build --build-arg BASE=dolfinx/dolfinx:v0.9.0 .
 ARG BASE=debian:trixie-slim
@@ -53,7 +53,7 @@ COPY --chown=rodfem:rodfem . .
 RUN if [ "$(command -v python3)" != /usr/bin/python3 ] || ! dpkg-query -W python3-dolfinx >/dev/null 2>&1; then \
         export RODFEM_PYTHON="$(command -v python3)"; \
     fi \
-    && tools/setup.sh viz,test && rm -rf /home/rodfem/.cache/pip
+    && tools/setup.sh viz,tables,test && rm -rf /home/rodfem/.cache/pip
 ENV PATH=/home/rodfem/rodfem/.venv/bin:$PATH
 
 # Pictures without a display; Open MPI on one machine, as in the Makefile.

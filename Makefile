@@ -33,7 +33,7 @@ help: ## list these commands
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 12
 
 setup: ## install what is missing: Debian packages (as root or by sudo) and .venv
-	@tools/setup.sh viz,test
+	@tools/setup.sh viz,tables,test
 
 demo: setup ## follow a hemitropic rod past its bifurcations and draw it
 	timeout --foreground -k 10 $(LIMIT) $(MPIRUN) -n 2 $(PYTHON) -m rodfem run demos/hemitropic.py

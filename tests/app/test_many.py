@@ -117,7 +117,6 @@ def test_a_table_is_refused_before_any_rod_is_traced(
 
 def test_a_family_has_the_critical_loads_of_every_rod(folder: Path) -> None:
     """The cord of N turns: 4 pi^2 (N^2 - 1); one has a second point, where the other has nan."""
-    pytest.importorskip("xarray")
     turns, plan = np.array([1.2, 1.5]), Plan(depth=0, error_bars=False)
     found = family(scene("cord"), {"k0": 2 * pi * turns}, folder, plan)
     assert np.allclose(found.first_loss, 4 * pi**2 * (turns**2 - 1), rtol=1e-10)
@@ -142,7 +141,6 @@ def assert_closed_form(found: Any) -> None:
 
 def test_rods_of_a_family_are_continued_from_their_neighbours(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 30 rods with two to four critical loads few are traced, and all have those of the closed form."""
-    pytest.importorskip("xarray")
     traced = list[float]()
     follow = many_rods.trace
     monkeypatch.setattr(many_rods, "trace", lambda rod, *a, **k: traced.append(1) or follow(rod, *a, **k))
@@ -155,7 +153,6 @@ def test_rods_of_a_family_are_continued_from_their_neighbours(folder: Path, monk
 
 def test_errors_of_a_family_are_bounds(folder: Path) -> None:
     """Of rods that were traced and of those that were continued."""
-    pytest.importorskip("xarray")
     found = family(hemitropic_cases.scene(), {"A": np.linspace(-3.0, -2.6, 4), "C": [1.0]}, folder)
     for rod in (found.isel(A=i, C=0) for i in range(4)):
         exact = closed_form_hemitropic.loads(float(rod.A), 1.0, 1.0, 3.0)
@@ -165,7 +162,6 @@ def test_errors_of_a_family_are_bounds(folder: Path) -> None:
 @pytest.mark.long
 def test_a_thousand_rods_in_a_minute(folder: Path) -> None:
     """On one core, with the closed form of each."""
-    pytest.importorskip("xarray")
     over, begun = {"A": np.linspace(-3.0, 0.0, 40), "C": np.linspace(0.8, 1.2, 25)}, process_time()
     found = family(hemitropic_cases.scene(), over, folder, Plan(depth=0, error_bars=False), comm=MPI.COMM_SELF)
     assert process_time() - begun < 60.0

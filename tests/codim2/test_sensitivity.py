@@ -119,7 +119,6 @@ def test_deviations_of_a_load_by_those_of_a_field() -> None:
 
 def test_deviation_by_a_family(tmp_path: Path) -> None:
     """By the rods at the points of Gauss's rule for a normal A, within the second order of the deviation."""
-    pytest.importorskip("xarray")
     scene, deviation = hemitropic_cases.scene(), 0.02
     first = rodfem.trace(scene, depth=0).special("branch point")[0].tolerance({"C": deviation})
     x, w = np.polynomial.hermite_e.hermegauss(5)

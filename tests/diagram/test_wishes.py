@@ -7,6 +7,7 @@ import demo_cases
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray
 from hemitropic_cases import scene
 
 import rodfem
@@ -36,7 +37,6 @@ def test_the_lines_of_a_notebook(diagram: Diagram) -> None:
 
 def test_twenty_wishes_are_a_line_each(diagram: Diagram) -> None:
     """What took a person a dozen tries, with its shape or its value."""
-    pytest.importorskip("xarray")
     point, branch = next(p for p in diagram.at(0.5) if p.stable), diagram["branch 1"]
     rows, fold, axes = len(point.s), diagram.special("fold")[0], plt.figure().gca()
     assert point.r.shape == (rows, 3)
@@ -140,7 +140,6 @@ def test_columns_are_those_of_the_points(ruler: Diagram) -> None:
 
 
 def test_tables_of_other_libraries(ruler: Diagram) -> None:
-    pytest.importorskip("xarray")
     frame, data = ruler.to_dataframe(), ruler.to_xarray()
     branch = ruler["branch 1"]
     own = frame[frame.branch == "branch 1"]
@@ -167,7 +166,6 @@ def test_the_page_from_python(ruler: Diagram, tmp_path: object) -> None:
 
 def test_netcdf_of_files_is_the_table_of_the_diagram(ruler: Diagram, tmp_path: Path) -> None:
     """Coordinates, units and all; profiles in files are at other points, from which nodes are interpolated."""
-    xarray = pytest.importorskip("xarray")
     console.main(["convert", str(ruler.save(tmp_path)), "--to", "netcdf"])
     read, own = xarray.open_dataset(tmp_path / "netcdf" / "diagram.nc"), ruler.to_xarray()
     assert {*read.coords} == {*own.coords} and {*read.data_vars} == {*own.data_vars} and read.sizes == own.sizes
