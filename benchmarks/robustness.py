@@ -49,7 +49,7 @@ WORDS = {
     "bifurcations": "Branch points 1e-12 apart, folds in pairs, cusps, crossings that cancel or touch, imperfections "
     "down to 1e-12, isolas, ranges that begin at a branch point or end at a fold, clusters of up to five "
     "points at random.",
-    "sweeps": "Beck's column in two planes, flutter and divergence that come and go, frequencies near "
+    "sweeps": "Beck's column in two planes, flutter and divergence that come and go within a step, frequencies near "
     "round-off, folds of the path, floating rings.",
     "loci": "Gaps between two curves, turning points, crossings, ends.",
     "published": "Michell's, Greenhill's and Goto's rings, localised and writhed rods, snapping strips and arches, "

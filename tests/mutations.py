@@ -197,6 +197,11 @@ TABLE = {
         "pairs-taken-for-one-meet-at-one-load": (
             "noise.of_discriminant + clear.split) /", "noise.of_discriminant) /", HARD),
         "pairs-that-have-just-met-enter": ("if D > 0 or just_met:", "if D > 0:", HARD),
+        "frequencies-that-meet-and-part-in-a-step": (
+            "for meeting in sorted(ahead,", "for meeting in sorted(ahead[:0],", HARD),
+        "two-that-cross-may-meet": (
+            "(products[:, i, j].real < -rounded) | ", "np.ones_like(D[:2], bool) | ",
+            "diagram/test_all_frequencies.py"),
         "divergence-numbered-across-collisions": (
             "if passed and not negative:", "if passed:", "literature/test_rods.py"),
         "divergence-of-rigid-motions": ("[self._zeros :]", "[0:]", "literature/test_free_rods.py"),

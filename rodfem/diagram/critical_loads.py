@@ -6,15 +6,29 @@ the discriminant of the pencil projected on the two of them.  Its zero is found 
 accuracy and without ever solving at the double eigenvalue.  A complex pair at one load goes on from that at the other
 one whose plane has its vectors, and whose value is near; another one comes from two real ones that meet on the way.
 Where a single real one passes through zero the rod diverges: the eigenvalue itself is smooth there.  A step in which
-what is found does not explain the numbers at both ends is parted.  Frequencies that meet and part again, or pass
-through zero and back, between two rows show in neither.
+what is found does not explain the numbers at both ends is parted.
+
+Frequencies that meet and part again, or pass through zero and back, between two rows show in neither.  In ``nu``
+(:mod:`rodfem.stability.spectrum`) ``D`` of two real ones vanishes where they meet, ``-D`` of a complex pair, and
+``mu`` of a single one where it passes through zero.  A parabola through three rows tells where each is lowest; where
+that comes near zero, the sweep has a load more.  Eigenvalues are known again at the neighbours of a row by their
+vectors: with ``Z^t Y = 1`` for the left and right ones at the row, ``|Z^t Y'|`` is greatest for the same motion.  Two
+real ones meet only where the load couples them, and not by a potential: with ``E`` the change of ``Z^t T Y``, to first
+order
+
+    D = ((nu_i + E_ii - nu_j - E_jj) / 2)^2 + E_ij E_ji,
+
+and the product is negative there.  All others cross, or turn away from one another.  Multiple eigenvalues are left out,
+and so is the upper half of a mesh's: it tells of the mesh rather than of the rod.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import isnan, nan
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -27,13 +41,15 @@ from rodfem.diagram.equilibria import at_load
 from rodfem.errors import ConvergenceError
 from rodfem.stability.cluster import Cluster, ClusterNoise, Measured, measure, noise_of, real_span
 from rodfem.stability.nonsymmetric import ALIKE, MULTIPLE, NonsymmetricPencil, NonsymmetricSolver, groups
-from rodfem.stability.spectrum import SHIFT, Spectrum, inside
+from rodfem.stability.spectrum import SHIFT, Spectrum, inside, times
 from rodfem.tolerances import ROUND_OFF, SAME_LOAD, SAME_SPECIAL, TINY, round_off, unit
 
 PARTS, PART = 100, 0.47
 """Times that steps of a sweep are parted, at most, and where: not in the middle, which is likely to be special."""
-CLOSEST = 1e-6
-"""Least distance of two loads, over that of rows."""
+NEARER, CLOSEST = 10, 1e-6  # loads at which a meeting is looked for, at most, and their least distance, over a step
+SMALL, CLEAR, ONE = 0.3, 100.0, 0.9
+"""Relative distance of two eigenvalues that do not meet in a step; products of changes, over their noise, that are none
+of round-off; square of the cosine of two vectors that are nearly one."""
 JUST_MET = 1e-4
 """Imaginary part, relative to the eigenvalue, below which a pair may be two real ones that meet, and round-off."""
 MOVED, OUTSIDE = 0.3, 0.2
@@ -132,12 +148,40 @@ class CriticalLoads:
         self.solver, self.eigensolver, self.warn = solver, eigensolver, warn
         self.units, self._load = solver.system.scene.units, solver.system.scene.load
         self._zeros = self._parted = 0
+        self._ahead = list[Meeting]()
         self.poles = list[int]()  # in the last step: changes of the number of negative eigenvalues through infinity
 
-    def critical_loads(self, a: Side, b: Side, zeros: int) -> list[Critical]:
+    def critical_loads(self, a: Side, b: Side, behind: Side | None, zeros: int) -> list[Critical]:
         """What happens between two rows, ``a`` and ``b``, in its order: collisions, and real ones that vanish."""
         self._zeros, self.poles = zeros, []
-        return sorted(self._step(a, b), key=lambda event: abs(event.load - a.load))
+        sides = [a, *self._met(a, b, behind), b]
+        events = [event for step in pairwise(sides) for event in self._step(*step)]
+        return sorted(events, key=lambda event: abs(event.load - a.load))
+
+    def _met(self, a: Side, b: Side, behind: Side | None) -> list[Side]:
+        """Loads of a step at which eigenvalues come nearest to one another, or to zero, and may meet; in its order."""
+        ahead, self._ahead = self._ahead, []
+        for meeting in meetings(a, b, behind) if behind else ():
+            beyond = (meeting.load - b.load) * (b.load - a.load) > 0.0
+            (self._ahead if beyond else ahead).append(meeting)
+        out = [a]
+        for meeting in sorted(ahead, key=lambda m: abs(m.load - a.load)):
+            if min(abs(meeting.load - side.load) for side in (*out, b)) > CLOSEST * abs(b.load - a.load):
+                out.append(self._nearest(out[-1], b, meeting))
+        return out[1:]
+
+    def _nearest(self, a: Side, b: Side, meeting: Meeting) -> Side:
+        """Where the eigenvalues of a ``meeting`` are nearest, or a load where they met."""
+        low, high, mine = a, b, self._side(a, meeting.load)
+        for _ in range(NEARER):
+            found = [m.load for m in meetings(low, mine, high) if abs(m.mean - meeting.mean) < 0.01 * abs(m.mean)]
+            load = min(found, key=lambda at: abs(at - mine.load), default=mine.load)
+            move = (load - mine.load) / (b.load - a.load)
+            if mine.spectrum.numbers != a.spectrum.numbers or abs(move) < CLOSEST:
+                break
+            low, high = (mine, high) if move > 0.0 else (low, mine)
+            mine = self._side(mine, load)
+        return mine
 
     def _side(self, a: Side, load: float) -> Side:
         """A load of a step that begins at a side: the equilibrium, and its eigenvalues."""
@@ -366,3 +410,80 @@ def same_negative(a: Spectrum, b: Spectrum) -> bool:
         return True
     basis = b.pairs.right[:, b.negative].real
     return bool(inside(basis, b.coordinates(a)[:, a.negative].real).min() >= 1.0 - OUTSIDE)
+
+
+class Meeting(NamedTuple):
+    """A ``load`` at which eigenvalues of this ``mean`` may meet, or one may vanish."""
+
+    load: float
+    mean: float
+
+
+def meetings(before: Side, row: Side, behind: Side) -> list[Meeting]:
+    """What comes near zero between a row and its neighbours."""
+    mine, size = row.spectrum, row.spectrum.right.shape[0]
+    if not (mine.complete and before.spectrum.right.shape[0] == behind.spectrum.right.shape[0] == size):
+        return []  # too many to find all of them, or sections have mass at some loads only
+    count = len(mine.values)
+    if count > 12:
+        count = max(12, count // 2)
+        count += int(mine.values[count - 1].imag < 0.0)  # of a pair that comes first
+    first, back = _neighbour(mine, before.spectrum, count)
+    last, ahead = _neighbour(mine, behind.spectrum, count)
+    nu = np.array([first, mine.pairs.nu[:count], last])
+    t = abs(before.load - row.load) / abs(behind.load - row.load)
+    found = _single(mine, nu, t)
+    if mine.order == 2:
+        found = _pairs(mine, nu, np.array([back * back.T, ahead * ahead.T]), t) + found
+    return [Meeting(row.load + at * (behind.load - row.load), mean) for at, mean in found]
+
+
+def _neighbour(row: Spectrum, other: Spectrum, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues (k,) of a neighbour, as the row has them, and the change of ``Z^t T Y`` to it (k, k)."""
+    left = times(row.lower, row.pairs.left[:count].T).T
+    places, others = assignment(-abs(left @ other.right))
+    matched = row.pairs.nu[:count].astype(complex)
+    matched[places] = other.pairs.nu[others]
+    projected = left @ times(other.inverse, times(other.lower.T, row.right[:, :count]))
+    return matched, projected - np.diag(row.pairs.nu[:count])
+
+
+def _pairs(row: Spectrum, nu: np.ndarray, products: np.ndarray, t: float) -> list[tuple[float, float]]:
+    """Where pairs come near one another, two real ones or a complex one and its conjugate, and their means."""
+    count = nu.shape[1]
+    values, noise, right = row.values[:count], row.pairs.noise[:count], row.pairs.right[:, :count]
+    i, j = np.triu_indices(count, 1)
+    one = abs((right.conj().T @ right)[i, j]) ** 2 > ONE
+    real, apart = (values.imag[i] == 0.0) & (values.imag[j] == 0.0), abs(nu[1, i] - nu[1, j])
+    size = np.minimum(abs(nu[1, i]), abs(nu[1, j]))
+    multiple = (apart < ALIKE * size) & ~one
+    alone = ~np.isin(np.arange(count), [*i[multiple], *j[multiple]])
+    conjugate = (values.imag[i] != 0.0) & (abs(nu[1, i] - nu[1, j].conj()) < ALIKE * size)
+    D = np.where(real, 1.0, -1.0) * ((nu[:, i] - nu[:, j]) ** 2).real / 4.0
+    rounded = (CLEAR * np.maximum(noise[i], noise[j])) ** 2
+    coupled = (products[:, i, j].real < -rounded) | one | conjugate
+    coupled &= (apart < SMALL * size) & (real | conjugate) & alone[i] & alone[j] & (D[[0, 2]] > rounded).all(axis=0)
+    return [(at, float((values[i[n]] + values[j[n]]).real / 2)) for n, at in _lowest(D, t, coupled)]
+
+
+def _single(row: Spectrum, nu: np.ndarray, t: float) -> list[tuple[float, float]]:
+    """Where eigenvalues come near zero, and do not pass through it, and what they are at the row."""
+    imaginary = row.values[: nu.shape[1]].imag
+    real = np.flatnonzero(imaginary == 0.0 if row.order == 2 else imaginary >= 0.0)
+    mu = row.shift + (1.0 / nu[:, real]).real
+    ends = (mu[0] * mu[2] > 0.0) & (np.minimum(abs(mu[0]), abs(mu[2])) > row.zero / row.one)
+    found = _lowest(np.sign(mu[0]) * mu, t, np.array([ends, ends]))
+    return [(at, float(row.values[real[n]].real)) for n, at in found]
+
+
+def _lowest(f: np.ndarray, t: float, allowed: np.ndarray) -> list[tuple[int, float]]:
+    """Where parabolas through ``f`` (3, k), at ``-t``, 0 and 1, are lowest near zero, as ``allowed``: column, place."""
+    back, ahead = (f[1] - f[0]) / t, f[2] - f[1]
+    bend = (ahead - back) / (1.0 + t)
+    slope = ahead - bend
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = np.where(bend > 0.0, -slope / (2.0 * bend), np.inf)
+        low = f[1] + at * (slope + at * bend)
+    ends = np.minimum(f[0], f[2])
+    inside = (-t < at) & (at < 1.0) & np.where(at >= 0.0, allowed[1], allowed[0]) & (ends > 0.0)
+    return [(int(n), float(at[n])) for n in np.flatnonzero(inside & (low < 0.7 * ends))]

@@ -60,7 +60,7 @@ class Sweep:
         self.number = plan.spectrum or FREQUENCIES
         self.curves = Curves(solver.system.comm)
         self.critical = CriticalLoads(solver, self.eigensolver, observer.warn)
-        self._last: Row | None = None
+        self._rows: list[Row] = []  # the last two, the latter of which is not taken into the branch yet
         self._zeros = self.number  # frequencies that are zero at all loads
         self._massless, self._counted = 0, False  # unstable motions without inertia, of no finite eigenvalue: 1 or 0
         self.branches: list[Branch] = []
@@ -116,18 +116,21 @@ class Sweep:
         self.eigensolver.slow = begins_slowly(first)
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
-        latest = self._point(x)
-        steps = LoadSteps(self.solver, latest, self.span)
-        self._take(branch, latest)
-        for load in loads[1:]:
-            state = steps.reach(load)
-            point = self._point(state)
-            if why := Arc(self.solver, latest, point).lost_convexity() or self._dependent(state):
-                return why
-            if load in stops:
-                steps.known = steps.known[-1:]
-            latest = point
+        try:
+            latest = self._point(x)
+            steps = LoadSteps(self.solver, latest, self.span)
             self._take(branch, latest)
+            for load in loads[1:]:
+                state = steps.reach(load)
+                point = self._point(state)
+                if why := Arc(self.solver, latest, point).lost_convexity() or self._dependent(state):
+                    return why
+                if load in stops:
+                    steps.known = steps.known[-1:]
+                latest = point
+                self._take(branch, latest)
+        finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
+            self._close(branch, None)
         return ""
 
     def _dependent(self, x: PETSc.Vec) -> str:
@@ -142,16 +145,23 @@ class Sweep:
         return ""
 
     def _take(self, branch: Branch, point: Point) -> None:
-        """Take the next row, with its eigenvalues, into a branch, and the special points before it."""
+        """Find the eigenvalues of the next row; the step before the last one can be taken then."""
         row = self._row(point)
+        self._close(branch, row)
+        self._rows = [*self._rows[-1:], row]
+
+    def _close(self, branch: Branch, following: Row | None) -> None:
+        """Take the last row, before the ``following`` one, into a branch, and the special points before it."""
+        if not self._rows:
+            return
+        before, row = self._rows[-2:-1], self._rows[-1]
         self._record(row, on_the_way=True)
-        if self._last is not None:
-            self._insert(branch, self._last, row)
-        self._last = row
-        branch.points.append(point)
-        if point.load in self._asked:
-            self._special(branch, self.solver.request(USER, point))
-        self.observer.progress(branch, point)
+        if before:
+            self._insert(branch, before[0], row, following)
+        branch.points.append(row.point)
+        if row.point.load in self._asked:
+            self._special(branch, self.solver.request(USER, row.point))
+        self.observer.progress(branch, row.point)
 
     def _row(self, point: Point) -> Row:
         """A point with all its eigenvalues, and its left-most frequencies with the names of those that are recorded."""
@@ -215,12 +225,12 @@ class Sweep:
         point.motion = list(found.kinds[: self.number])
         point.curve = self.curves.numbers(found, keep=on_the_way)[: self.number]
 
-    def _insert(self, branch: Branch, first: Row, second: Row) -> None:
+    def _insert(self, branch: Branch, first: Row, second: Row, following: Row | None) -> None:
         """Take what happens between two loads into a branch: critical loads, in their order, each with its state."""
-        a, b = first.point, second.point
+        a, b, behind = first.point, second.point, following and following.side
         zeros = min(first.found.zeros(), second.found.zeros())
         with self.solver.system.clock.scope("location"):
-            events = self.critical.critical_loads(first.side, second.side, zeros)
+            events = self.critical.critical_loads(first.side, second.side, behind, zeros)
         negative = a.negative
         for event in events:
             after = negative + event.change

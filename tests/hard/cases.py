@@ -200,11 +200,12 @@ SWEEPS = (
     *(
         Case(
             SWEEP,
-            f"{kind} that comes and goes, at a row", "complex pairs, or negative eigenvalues, of a range within two "
-            "steps, about the greatest thrust", SAID, "Beck, thrusts that follow in part, by characteristic equations",
-            "greatest thrust less the critical one", partial(thrusts.pair, kind), (1e-2,), ABOVE,
+            f"{kind} that comes and goes{where}", "complex pairs, or negative eigenvalues, of a range within one "
+            "step, about the greatest thrust", SAID, "Beck, thrusts that follow in part, by characteristic equations",
+            "greatest thrust less the critical one", partial(thrusts.pair, kind, at), few, ABOVE,
         )
         for kind in ("flutter", "divergence")
+        for at, where, few in ((thrusts.BETWEEN, "", (1e-4,)), (thrusts.AT_ROW, ", at a row", (1e-2,)))
     ),
     Case(
         STEP,

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import acos, pi
 from pathlib import Path
+from typing import Any
 
 import classics
 import numpy as np
@@ -45,6 +46,19 @@ def test_a_follower_load(scene: Scene, load: float, frequency: float, number: in
     assert (found.negative_before, found.negative_after) == (0, number)
     assert abs(found.point.load - load) < found.error_estimate + 1e-11 < 1e-8
     assert abs(found.omega2 - frequency**2) < found.omega2_error + 1e-8 < 1e-5
+
+
+def test_an_oscillation_between_two_loads() -> None:
+    """The push rises above the critical one for a third of a step of the sweep, between its loads."""
+
+    def pull(c: Any) -> tuple[float, float, Any]:
+        return (0.0, 0.0, 4e4 * (c.F - 0.503) ** 2 - 37.69543084032 - 0.004)
+
+    rod = replace(FILAMENT, ends=(clamped(), free(follower=pull)))
+    first, last, _ = rodfem.trace(rod, plan=Plan((0.48, 0.53), error_bars=False))[0].special
+    assert (first.negative_after, last.negative_after) == (2, 0)
+    for special, load in ((first, 0.503 - 1e-7**0.5), (last, 0.503 + 1e-7**0.5)):
+        assert abs(special.point.load - load) < 1e-11
 
 
 def flutters(load: float, frequency: float, part: float) -> np.ndarray:
