@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import partial
 
-from hard import classical, heavy, published, snapping, springy_rings, stiffness, writhing
+from hard import classical, published, snapping, springy_rings, stiffness, writhing
 from hard.case import ASKED, Measured, compare, run, said, singular
 from literature.test_classics import CRITICAL
 
@@ -33,8 +33,8 @@ PROBLEMS: dict[str, Problem] = {
     **{f"ring on {n} springs": partial(springy_rings.ring, n) for n in (3, 4)},
     **{f"elastica out of its plane, {C:g}": partial(writhing.shortened, C) for C in (1.25, 0.5)},
     "writhing": partial(writhing.turned, 0.5, 1.0),
-    "heavy, curved": partial(heavy.shortened, 1.0, 20.0),
-    "heavy, curved, writhing": partial(heavy.turned, 0.4, 2.0, 50.0),
+    "heavy, curved": partial(writhing.heavy_shortened, 1.0, 20.0),
+    "heavy, curved, writhing": partial(writhing.heavy_turned, 0.4, 2.0, 50.0),
 }
 
 

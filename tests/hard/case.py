@@ -1,9 +1,12 @@
 """A hard case: what makes it hard, what is promised, and what is measured of it against a closed form or a source."""
 
+import json
 from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import cache
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any
 
 from rodfem import Branch, ConvergenceError, Diagram, Discretization, InputError, Plan, Scene, SpecialPoint, trace
@@ -20,6 +23,21 @@ class Change:
     load: float
     before: int
     after: int
+
+
+@cache
+def references() -> dict[str, Any]:
+    """Numbers of series without a closed form, to about 1e-12, that other programs than rodfem have computed.
+
+    How is said in the modules of the series.
+    """
+    read: dict[str, Any] = json.loads((Path(__file__).parent / "references.json").read_text())
+    return read
+
+
+def reference(series: str, *values: float) -> list[Change]:
+    """Special points of a series for values of its parameters."""
+    return [Change(*change) for change in references()[series][", ".join(f"{value:g}" for value in values)]]
 
 
 @dataclass(frozen=True)

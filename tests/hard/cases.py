@@ -6,7 +6,6 @@ from hard import (
     bifurcations,
     classical,
     endurance,
-    heavy,
     isolas,
     loci,
     loci_codim2,
@@ -419,14 +418,14 @@ PUBLISHED = (
         INDEX,
         "a heavy, curved rod lost out of its plane", "a natural curvature of which nothing is seen in the plane; ends "
         "up to 0.7 nearer", EXACT, "Lazarus, Miller, Metlitz & Reis 2013; shooting in space, conjugate points",
-        "natural curvature, weight", lambda given: heavy.shortened(*given), ((1.0, 20.0),),
+        "natural curvature, weight", lambda given: writhing.heavy_shortened(*given), ((1.0, 20.0),),
         ((1.0, 0.0), (1.0, 20.0), (1.0, 60.0), (3.0, 20.0), (3.0, 60.0), (5.0, 20.0)),
     ),
     Case(
         POINTS,
         "writhing of a heavy, curved rod", "the end turns by 4 pi, and back from one fold to the other; no symmetry at "
         "all", EXACT, "Lazarus, Miller & Reis 2013; shooting in space, conjugate points",
-        "end shortening, natural curvature, weight", lambda given: heavy.turned(*given), ((0.4, 2.0, 50.0),),
+        "end shortening, natural curvature, weight", lambda given: writhing.heavy_turned(*given), ((0.4, 2.0, 50.0),),
         ((0.5, 0.5, 10.0), (0.4, 2.0, 50.0), (0.4, 3.0, 50.0), (0.25, 5.0, 100.0), (0.25, 10.0, 20.0)),
     ),
 )  # fmt: skip

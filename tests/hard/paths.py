@@ -8,8 +8,8 @@ from typing import Any
 
 import classics
 import ufl
-from hard.case import Measured, run, said
-from hard.snapping import RANGE, extremes, turning
+from hard.case import Measured, reference, run, said
+from hard.snapping import turning
 
 from rodfem import Diagram, Discretization, Ordinate, Ring, Scene, clamped, free
 from rodfem.forms import loads
@@ -27,13 +27,11 @@ def ends_at(diagram: Diagram) -> float:
     return next((float(one[1]) for one in found if one), float("nan"))
 
 
-def snapping(load: float, share: float, down: bool = False) -> Measured:
-    """A cantilever whose clamp turns, and whose load follows its tip by a ``share``: where the sweep ends."""
-    span = (RANGE, -RANGE) if down else (-RANGE, RANGE)
-    fold = (min if down else max)(extremes(load, share))
-    diagram = run(turning(load, share, span), Discretization("auto", 8, 6), error_bars=False)
-    beyond = [p for p in diagram[0].points if (p.load < fold if down else p.load > fold)]
-    apart = abs(ends_at(diagram) - fold)
+def snapping(load: float, share: float) -> Measured:
+    """A cantilever whose clamp turns, and whose load follows its tip by a ``share``: the sweep ends at the fold."""
+    (fold,) = reference("hysteresis", load, share)
+    diagram = run(turning(load, share), Discretization("auto", 8, 6), error_bars=False)
+    beyond, apart = [p for p in diagram[0].points if p.load > fold.load], abs(ends_at(diagram) - fold.load)
     if beyond or not apart < inf:
         return Measured(inf, 1.0, (), f"{beyond} beyond {fold}, ended {diagram[0].ended}")
     return Measured(apart, NEAR)
