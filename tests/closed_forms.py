@@ -5,7 +5,7 @@ from math import pi, sqrt
 
 import numpy as np
 from numpy.polynomial import Legendre
-from scipy.linalg import eigvals, expm
+from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 from scipy.special import ellipe, ellipk, jv
 
@@ -113,15 +113,3 @@ def polynomials(number: int, clamped: bool = True) -> tuple[np.ndarray, np.ndarr
     factor = Legendre([1 / 3, 1 / 2, 1 / 6] if clamped else [1.0], domain=[0, 1])  # s^2
     basis = [factor * Legendre.basis(i, domain=[0, 1]) for i in range(number)]
     return (x + 1) / 2, weight / 2, lambda n, s=(x + 1) / 2: np.array([f.deriv(n)(np.asarray(s)) for f in basis])
-
-
-def flutter_along(compression: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> float:
-    """Flutter load of a cantilever under forces along it that follow: ``w'''' + P compression(s) w'' = mu w``."""
-    s, weight, w = polynomials(14)
-    K, M, G = (w(2) * weight) @ w(2).T, (w(0) * weight) @ w(0).T, (w(0) * weight * compression(s)) @ w(2).T
-
-    def discriminant(P: float) -> float:
-        mu = np.sort_complex(eigvals(K + P * G, M))[:2]
-        return float(((mu[0] - mu[1]) ** 2).real)
-
-    return brentq(discriminant, low, high, xtol=1e-12)

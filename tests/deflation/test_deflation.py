@@ -8,8 +8,9 @@ import hemitropic_cases
 import numpy as np
 import pytest
 from demo_cases import Found, explored, scene
-from literature.test_cord import SHOOTING, default, shot
+from literature.test_cord import default
 from rescaled import DNA, rescaled
+from shooting_solver import Problem, Rod
 
 from rodfem import Discretization, InputError, Plan, Point, Solver, pinned, trace
 from rodfem.continuation.branch_solver import BranchSolver
@@ -49,8 +50,10 @@ def test_cord() -> None:
             assert (match.negative, match.zero) == (p.negative, p.zero)
     assert not [p for p in new if abs(p.ordinate) < 1e-9]
     for p in new:
-        guess = shot(found, p)
-        q, end = SHOOTING.solve(guess)
+        n, k = found.start_of_rod(p)
+        guess = np.array([n[0], n[1], p.load, k[0], k[1] - 3 * np.pi, k[2]])
+        rod = Rod(intrinsic=(0.0, 3 * np.pi, 0.0))
+        q, end = Problem(rod, rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5]).solve(guess)
         assert abs(q - guess).max() < 0.1
         assert (end[10], 1 - end[9]) == pytest.approx((p.energy, p.ordinate), abs=1e-4)
     assert search.tries.count(NEW) == len(new)

@@ -2,25 +2,12 @@
 
 from math import pi
 
-import numpy as np
 import pytest
 from closed_forms import coil, tensions
 from demo_cases import Found, explored
-from hemitropic_cases import specials, user_points
-from scipy.optimize import brentq
-from shooting_solver import Problem, Rod
-
-from rodfem.continuation.branch import Point
+from hemitropic_cases import specials
 
 AT = (39.9, 40.0, 40.1)
-K0 = 3 * pi
-SHOOTING = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
-
-
-def shot(found: Found, point: Point) -> np.ndarray:
-    """First guess of force and moment at s = 0 for shooting."""
-    n, k = found.start_of_rod(point)
-    return np.array([n[0], n[1], point.load, k[0], k[1] - K0, k[2]])
 
 
 def default(formulation: str = "reduced") -> Found:
@@ -77,25 +64,23 @@ def test_euler_buckling_out_of_the_plane_of_curvature() -> None:
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("name", ["branch 1", "branch 2"])
-def test_perversions(name: str) -> None:
-    (p,) = user_points(default()[name], 40.0)
-    (s,) = [s for s in default()[name].special if s.point is p]
-    _, end = SHOOTING.solve(shot(default(), p))
-    assert abs(1 - end[9] - p.ordinate) <= s.error_estimate + 1e-11 <= 4e-10
-    assert p.energy == pytest.approx(end[10], abs=1e-8)
-    assert p.negative == {"branch 1": 0, "branch 2": 2}[name]
+@pytest.mark.parametrize(
+    ("name", "index", "ordinate", "energy"),
+    [("branch 1", 0, 0.5793314270531122, 18.619732294799), ("branch 2", 2, 0.4471009289604404, 38.650541761819)],
+)
+def test_perversions(name: str, index: int, ordinate: float, energy: float) -> None:
+    (s,) = [s for s in default()[name].special if s.kind == "user" and s.point.load == 40.0]
+    assert abs(ordinate - s.point.ordinate) <= s.error_estimate + 1e-11 <= 4e-10
+    assert s.point.energy == pytest.approx(energy, abs=1e-8)
+    assert s.point.negative == index
     if name == "branch 1":
-        assert p.ordinate == pytest.approx(0.5793314271, abs=2e-10)
         assert {q.negative for q in default()[name].points[1:]} == {0}
 
 
 def test_fold() -> None:
     branch = default()["branch 2"]
     (fold,) = specials(branch, "fold")
-    p, _ = SHOOTING.solve(shot(default(), fold.point), shot=[0, 1, 2, 3, 5])  # the load instead of a moment
-    assert p[2] == pytest.approx(7.8065554232, abs=1e-10)
-    assert abs(fold.point.load - p[2]) <= fold.error_estimate + 1e-10 <= 1e-9  # 1e-10: what shooting leaves open
+    assert abs(fold.point.load - 7.806555423257394) <= fold.error_estimate + 1e-10 <= 1e-9  # 1e-10: left by shooting
     assert (fold.negative_before, fold.negative_after) == (1, 2)
     for q in branch.points[1:]:
         if q is not fold.point:
@@ -106,8 +91,7 @@ def test_first_branch_ends_on_planar_coils() -> None:
     first, above, below = (default()[name] for name in ("branch 1", "branch 1.1", "branch 1.2"))
     assert first.ended.startswith("meets another branch")
     meeting = first.special[-1]
-    lam = brentq(lambda x: SHOOTING.singular(np.array([0, 0, x, 0, coil(x)[2] - K0, 0])), 35.5, 36.1, xtol=1e-10)
-    assert abs(meeting.point.load - lam) <= meeting.error_estimate <= 3e-8
+    assert abs(meeting.point.load - 35.80096162556552) <= meeting.error_estimate <= 3e-8  # by shooting
     assert above.points[1].load > meeting.point.load > below.points[1].load
     assert ({p.negative for p in above.points[1:]}, {p.negative for p in below.points[1:]}) == ({1}, {0})
     assert (above.points[-1].load, below.points[-1].load) == (60.0, 0.0)

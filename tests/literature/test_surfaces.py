@@ -103,13 +103,3 @@ def test_a_surface_along_the_rod(height: str) -> None:
     middle = len(point.s) // 2
     assert point.r[middle, 0] == pytest.approx(WAVE, rel=accuracy)
     assert point.moment[middle, 1] == pytest.approx(-2 * np.pi**2 * WAVE, rel=accuracy)
-
-
-@pytest.mark.parametrize("ends", ("pinned", "hinged"))
-def test_a_rod_in_a_horizontal_tube(ends: str) -> None:
-    """Dawson & Paslay, J. Pet. Technol. 36 (1984) 1734-1738: (n pi)^2 + 1000 / (n pi)^2 is least for n = 2."""
-    tube = replace(TUBE, ends=ENDS[ends])
-    diagram = rodfem.trace(tube, Discretization("pointwise", 6, 6), Plan(depth=0))
-    (found,) = diagram.special("branch point")
-    assert found.point.load == pytest.approx(64.80871351494, abs=1e-9)
-    assert found.error_estimate < 1e-8
