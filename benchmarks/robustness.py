@@ -52,7 +52,7 @@ WORDS = {
     "sweeps": "Beck's column in two planes, flutter and divergence that come and go within a step, frequencies near "
     "round-off, folds of the path, floating rings.",
     "loci": "Gaps between two curves, turning points, crossings, ends.",
-    "published": "Michell's, Greenhill's and Goto's rings, localised and writhed rods, snapping strips and arches, "
+    "published": "Michell's, Greenhill's and Goto's rings, writhed rods, snapping strips and arches, "
     "heavy curved rods, against closed forms, shooting in space and the authors' numbers.",
     "endurance": "Branches of 10,000 rows, 1,000 scenes in one process.",
 }

@@ -22,7 +22,7 @@ PROBLEMS: dict[str, Problem] = {
     **{f"bending ratio {B2:g}": partial(stiffness.ratio, B2) for B2 in (10.0, 1e3)},
     **{f"end turned, C = {C:g}": partial(stiffness.turned, C) for C in (2.0, 0.6)},
     **{f"spring {part:g}": partial(published.spring, part) for part in (0.1, 1e-3)},
-    **{f"clamped spring {part:g}": partial(published.clamped_spring, part) for part in (1e-2, -1e-4)},
+    **{f"clamped spring {part:g}": partial(published.spring, part, "clamped-clamped") for part in (1e-2, -1e-4)},
     **{f"{load} ring": partial(published.ring, load) for load in published.RINGS},
     **{f"cord of {turns} turns": partial(published.cord, turns) for turns in (2, 10)},
     "deep arch": partial(published.arch, 6),

@@ -1,6 +1,6 @@
 """Hard by what happens: branch points and folds near each other, at one load, in one step, at the end of a range."""
 
-from math import erf, inf, log, pi
+from math import erf, inf, log, pi, sqrt
 from typing import Any
 
 import ufl
@@ -10,11 +10,13 @@ from hard.case import Change, Measured, compare, run, said, singular
 from hard.stiffness import EULER
 from hard.two_freedoms import scene
 
-from rodfem import Discretization
+from rodfem import Discretization, Ordinate, Scene, clamped, free
 from rodfem.continuation.kinds import IMPERFECT
 
 MEND = 1e-4
 """Lateral load below which the steps jump the gap, which tells of the other side; above it a search finds that."""
+LATERAL = 1e-3
+"""Lateral load of the cantilever beside an isola, along e2."""
 MESH = Discretization("reduced", 4, 3)
 
 
@@ -61,20 +63,12 @@ def crossings(apart: float) -> Measured:
     return compare(singular(diagram[0]), [Change(-d, 0, 1), Change(d, 1, 0)], said(diagram))
 
 
-def opposite(apart: float) -> Measured:
+def opposite(inside: int, apart: float) -> Measured:
     """Two eigenvalues that cross in opposite directions, ``apart`` in load: the index is 1 on either side."""
     model = scene(lambda u, f2, c: 0.5 * (c.P + c.a) * u**2 + 0.5 * (c.a - c.P) * f2 + 0.1 * (u**4 + f2**2),
-                  (-0.31, 0.4), a=apart / 2)  # fmt: skip
+                  (-0.31, 0.4), a=(1 - inside) * apart / 2)  # fmt: skip
     diagram = run(model, MESH)
-    return compare(singular(diagram[0]), [Change(-apart / 2, 1, 0), Change(apart / 2, 0, 1)], said(diagram))
-
-
-def opposite_other(apart: float) -> Measured:
-    """The same, the index 2 between the two loads."""
-    model = scene(lambda u, f2, c: 0.5 * (c.P - c.a) * u**2 + 0.5 * (-c.a - c.P) * f2 + 0.1 * (u**4 + f2**2),
-                  (-0.31, 0.4), a=apart / 2)  # fmt: skip
-    diagram = run(model, MESH)
-    return compare(singular(diagram[0]), [Change(-apart / 2, 1, 2), Change(apart / 2, 2, 1)], said(diagram))
+    return compare(singular(diagram[0]), [Change(-apart / 2, 1, inside), Change(apart / 2, inside, 1)], said(diagram))
 
 
 def transcritical(slope: float) -> Measured:
@@ -109,3 +103,34 @@ def imperfect(lateral: float) -> Measured:
     if len(found) != 1:
         return Measured(inf, 1.0, said(diagram), f"{found} where one fold was expected")
     return compare(found, [Change(fold_of(lateral), found[0].negative_before, found[0].negative_after)], said(diagram))
+
+
+def thrust(c: Any) -> tuple[Any, ...]:
+    """The thrust P - t^2 rises and falls again with t."""
+    return (0.0, c.e, c.t * c.t - c.P)
+
+
+def with_isola(excess: float) -> Scene:
+    """A cantilever under a lateral load and a thrust that exceeds its fold by ``excess`` at most, at t = 0.
+
+    Bent against the lateral load it is in equilibrium where the thrust is above that fold: from t = -sqrt(excess) to
+    sqrt(excess), in two states, of index 0 and 1.  The fold is that of the elastica in closed form.
+    """
+    return column(
+        "isola", (clamped(), free(thrust)), (-1.0, 1.0), load="t", planar="e1",
+        constants={"t": -1.0, "P": fold_of(LATERAL) + excess, "e": LATERAL},
+        ordinate=Ordinate("tip", s=1.0, of=lambda r, q: r[1]),
+    )  # fmt: skip
+
+
+def isola(excess: float) -> Measured:
+    """Both folds of the isola, and nothing else."""
+    diagram = run(with_isola(excess), Discretization("auto", 6, 6), at=(0.0,), tries=6)
+    if [b.ended for b in diagram] != ["end of range", "closed loop"] or singular(diagram[0]):
+        return Measured(inf, 1.0, said(diagram), f"{diagram.branches} where one beside an isola was expected")
+    folds = sorted(singular(diagram[1]), key=lambda s: s.point.load)
+    indices = [(s.negative_before, s.negative_after) for s in folds]
+    if sorted(indices) != [(0, 1), (1, 0)]:
+        return Measured(inf, 1.0, said(diagram), f"{folds} where two folds were expected")
+    expected = [Change(sign * sqrt(excess), *index) for sign, index in zip((-1, 1), indices, strict=True)]
+    return compare(folds, expected, said(diagram))

@@ -38,45 +38,6 @@ def cusp(width: float) -> Measured:
     return Measured(_marked(found, "cusp", (0.0, 0.0)) if whole else inf, 1.0, (), "" if whole else str(words(found)))
 
 
-def skew_cusp(part: float) -> Measured:
-    """Folds ``P + b = 3 u^2``, ``part (P - b) = -2 u^3``: turns in b and P at ``u = -+ part`` beside a cusp."""
-    potential = lambda u, f2, c: u**4 / 4 - (c.P + c.b) * u * u / 2 - part * (c.P - c.b) * u + f2 / 2  # noqa: E731
-    diagram = run(two_freedoms(potential, (0.2, -0.2), b=0.1), UNIFORM, error_bars=False)
-    found = diagram.locus(diagram.special("fold")[0], "b", (-1.0, 1.0), (-1.0, 1.0))
-    u = found.ordinate
-    whole = [mark.kind for mark in found.marks] == ["turns in b", "cusp", "turns in P"]
-    off = [abs(u[mark.row] - at) for mark, at in zip(found.marks, (-part, 0.0, part), strict=False)]
-    exact = np.stack([3 * u * u - 2 * u**3 / part, 3 * u * u + 2 * u**3 / part], axis=1) / 2
-    tangent = np.stack([3 * u - 3 * u * u / part, 3 * u + 3 * u * u / part], axis=1)
-    distance = abs(np.cross(found.values - exact, tangent)) / np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)
-    return Measured(max(distance.max(), *off) if whole else inf, 1e-9, (), "" if whole else str(words(found)))
-
-
-def two_cusps(half: float) -> Measured:
-    """Folds of ``u^5/5 + a u^3/3 + b u^2/2 - P u``, ``a = -6 half^2``: a swallowtail with cusps at ``u = -+ half``."""
-    a = -6 * half**2
-    potential = lambda u, f2, c: u**5 / 5 + c.a * u**3 / 3 + c.b * u * u / 2 - c.P * u + f2 / 2  # noqa: E731
-    diagram = run(two_freedoms(potential, (0.01, -0.01), a=a, b=0.004), UNIFORM, error_bars=False)
-    found = diagram.locus(diagram.special("fold")[0], "b", (-0.02, 0.02), (-0.02, 0.02))
-    u = found.ordinate
-    marks = [(mark.kind, float(u[mark.row])) for mark in found.marks]
-    all_of_them = [kind for kind, _ in marks] == ["cusp", "turns in P", "cusp"]
-    off = [abs(abs(at) - (half if kind == "cusp" else 0.0)) for kind, at in marks]
-    rows = abs(found.values - np.stack([-3 * u**4 - a * u * u, -(4 * u**3 + 2 * a * u)], axis=1)).max()
-    return Measured(max(rows, *off) if all_of_them else inf, 1e-7, (), "" if all_of_them else str(marks))
-
-
-def butterfly(half: float) -> Measured:
-    """Folds of ``u^6/6 + a u^4/4 - b u^2/2 - P u``, ``a = -20/6 half^2``: cusps at ``u = -half, 0, half``."""
-    a = -20 / 6 * half**2
-    potential = lambda u, f2, c: u**6 / 6 + c.a * u**4 / 4 - c.b * u * u / 2 - c.P * u + f2 / 2  # noqa: E731
-    diagram = run(two_freedoms(potential, (0.02, -0.02), a=a, b=0.005), UNIFORM, error_bars=False)
-    found = diagram.locus(diagram.special("fold")[0], "b", (-1.0, 1.0), (-1.0, 1.0))
-    at = sorted(float(found.ordinate[mark.row]) for mark in found.marks if mark.kind == "cusp")
-    off = max(map(abs, np.subtract(at, (-half, 0.0, half)))) if len(at) == 3 else inf
-    return Measured(off, 1e-7, (), "" if len(at) == 3 else str(found.marks))
-
-
 def passes(skew: float) -> Measured:
     """Folds ``P - 1.5 skew b = -(b + skew P)^2/4`` pass a branch point: one curve, no cusp, no end."""
     potential = lambda u, f2, c: (  # noqa: E731

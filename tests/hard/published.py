@@ -12,7 +12,7 @@ import ufl
 from classics import SUPPORTS, column
 from hard.case import Change, Measured, compare, run, said, singular
 
-from rodfem import Discretization, Event, Ordinate, Parameter, Ring, Scene, Solver, clamped, sliding
+from rodfem import Discretization, Ordinate, Parameter, Ring, Scene, Solver, clamped, sliding
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 
@@ -46,10 +46,6 @@ def spring(above: float, supports: str = "pinned-pinned") -> Measured:
         expected = [Change(x, i, 1 - i) for i, x in enumerate((low, high)) if 0.4 < x < 0.95]
     diagram = run(scene)
     return compare(singular(diagram[0]), expected, said(diagram))
-
-
-def clamped_spring(above: float) -> Measured:
-    return spring(above, "clamped-clamped")
 
 
 # --- pressed rings --------------------------------------------------------------------------------------------------
@@ -111,38 +107,7 @@ def cord(turns: float) -> Measured:
     return compare(singular(diagram[0]), changes, said(diagram))
 
 
-LOCALISED = 2900.993205792131
-"""Tension over B/L^2 of 27 turns, C/B = 0.789/1.345, slack 0.03 (moment 98.541496171190744 B/L), on an infinite rod.
-
-Clamps raise it by 3.84e-5, which the error bars of more than 50 elements of degree 6 resolve.
-"""
-
-
-def localised(elements: int) -> Measured:
-    """Twisted by 27 turns, and buckled into one helix that fades away towards both clamps."""
-    from continuation.test_index_chain import localised as rod
-
-    slack = Event("slack", of=lambda state: 0.97 - state.r[-1, 2])
-    diagram = run(rod(), Discretization("reduced", elements, 6), depth=1, events=(slack,))
-    found = [s for s in diagram.special("event") if abs(s.point.load / LOCALISED - 1) < 0.01]
-    if not found:
-        return Measured(inf, 1.0, said(diagram), "the slack is not met")
-    error, bar = abs(found[0].point.load - LOCALISED), found[0].error_estimate
-    return Measured(error, bar, said(diagram), ratios=(error / bar,))
-
-
 # --- others ---------------------------------------------------------------------------------------------------------
-
-
-def winkler(B2: float) -> Measured:
-    """A pinned column on a foundation of k = 4 pi^4: one wave and two at 5 pi^2, in each plane it bends in alike."""
-    scene = classics.winkler()
-    parameters = {**scene.parameters, "k": Parameter(4 * pi**4), "B2": Parameter(B2)}
-    scene = replace(scene, parameters=parameters, span=(0.0, 5.9 * pi**2))
-    loads_of = sorted(B * n * n * pi**2 + 4 * pi**2 / n**2 for B in (1.0, B2) for n in (1, 2, 3))
-    expected = [Change(x, i, i + 1) for i, x in enumerate(x for x in loads_of if x < 5.9 * pi**2)]
-    diagram = run(scene)
-    return compare(singular(diagram[0]), expected, said(diagram))
 
 
 def shearable_helix(slenderness: float, degree: int = 4) -> float:

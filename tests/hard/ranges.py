@@ -32,19 +32,6 @@ def within(low: float, high: float) -> Measured:
     return compare(singular(diagram[0]), expected, said(diagram))
 
 
-def about(half: float) -> Measured:
-    return within(EULER - half, EULER + half)
-
-
-def back(half: float) -> Measured:
-    return within(EULER + half, EULER - half)
-
-
-def beside(short: float) -> Measured:
-    """A range that ends, or begins, just before a branch point."""
-    return within(EULER + short, 2 * EULER - short)
-
-
 def asked(off: float) -> Measured:
     """A load asked for: its row is there, and has the index of its side; at the branch point one zero eigenvalue."""
     scene = column("asked", SUPPORTS["clamped-free"], (0.0, 4.0))
@@ -72,8 +59,3 @@ def turning(short: float, height: float = HEIGHT) -> Measured:
     if outside or branch.ended != "end of range" or abs(branch.points[-1].ordinate - u) > TO * abs(u):
         return Measured(inf, 1.0, said(diagram), f"ended: {branch.ended}, at {branch.points[-1].ordinate}, not {u}")
     return compare(singular(branch), [], said(diagram))
-
-
-def turning_in_the_last_step(short: float) -> Measured:
-    """The same, with both folds and the end of the range in one step."""
-    return turning(short, LOW)

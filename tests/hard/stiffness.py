@@ -43,14 +43,6 @@ def euler(mesh: Discretization) -> Measured:
     return compare(singular(diagram[0]), [Change(EULER, 0, 1)], said(diagram))
 
 
-def elements(number: int) -> Measured:
-    return euler(Discretization("reduced", number, 1))
-
-
-def degree(p: int) -> Measured:
-    return euler(Discretization("reduced", 4, p))
-
-
 def graded(smallest: float) -> Measured:
     """Elements that shrink by equal factors towards the clamp, down to ``smallest``."""
     vertices = (0.0, *np.geomspace(smallest, 1.0, 12))

@@ -64,27 +64,6 @@ def test_an_oval_that_lies_otherwise_to_the_elements_is_no_other_branch() -> Non
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("seed", "number"), [(5, 29), (24, 195)])
-@pytest.mark.usefixtures("few_rows")
-def test_sides_that_differ_across_their_plane_are_both_traced(seed: int, number: int) -> None:
-    """Hinges askew: on one side of the pitchfork the index is 0, or rises to 2, where the other has one more, or less.
-
-    In its plane each is the other's mirror image.  The determinants of the second rod's differ by 6e-4 only.
-    """
-    found = compared(scene(seed, number), number, depth=1)
-    assert (found.wrong, found.differs, found.said) == ([], [], [])
-
-
-@pytest.mark.long
-def test_a_side_that_turns_beside_the_branch_point_is_no_image() -> None:
-    """One side turns at a fold 1.4e-9 in load below the branch point, the other has none: both are traced."""
-    rod = scene(45, 63)
-    for mesh, plan in zip(comparison.meshes(rod, 63), comparison.plans(rod, 1), strict=True):
-        diagram = trace(rod, mesh, replace(plan, error_bars=False))
-        assert len(diagram) == 5
-
-
-@pytest.mark.long
 def test_the_way_down_leaves_a_saddle() -> None:
     """A ring with nearly round sections: a mode of mu = -2e-4 is passed slowly, and one mesh in two stayed there."""
     found = []

@@ -2,7 +2,7 @@
 
 Each scene is worked on in a child process, which is replaced where it takes too long or dies.  A line of JSON a scene
 is added to ``results/fuzz-SEED.jsonl`` (or ``--output FILE``); scenes that have one are not repeated.  ``--only N``
-works on one scene and prints what it shows, ``--summary FILE...`` says what files contain.
+works on one scene and prints what it shows.
 """
 
 import argparse
@@ -27,11 +27,8 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=LIMIT, help="seconds of a scene")
     parser.add_argument("--output", type=Path)
     parser.add_argument("--only", type=int, help="number of the only scene, in this process")
-    parser.add_argument("--summary", type=Path, nargs="+", metavar="FILE")
     given = parser.parse_args()
-    if given.summary:
-        print(worker.in_words([json.loads(line) for file in given.summary for line in file.read_text().splitlines()]))
-    elif given.only is not None:
+    if given.only is not None:
         print(json.dumps(worker.examine(given.seed, given.only, given.depth), indent=1))
     else:
         file = given.output or Path("results") / f"fuzz-{given.seed}.jsonl"

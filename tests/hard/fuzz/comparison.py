@@ -6,7 +6,7 @@ points within the sum of their error bars; states at the loads asked for; the nu
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 from math import inf, isfinite
 from typing import Any
@@ -34,19 +34,11 @@ SQUARE = 1e-5
 """Relative difference of two values of omega^2 that are one: double ones have half of the digits."""
 SURE = 0.1
 """Part of that which may be round-off of the dense eigenvalues."""
-STORED = 1e-6
-"""Relative difference of two stored energies that are one."""
-OF_ENERGIES = 100
-"""An energy's relative error, at most, over that of the ordinate."""
-UNTOLD = 1e-6
-"""The latter, where the ordinate is zero by symmetry: its bar tells nothing of the meshes."""
 ROWS = 40, 12
 """Most rows of the first and of the second trace that are counted, spread over all of them."""
 MOST_BRANCHES = 7
 ENDED = ("end of range", "closed loop", "meets another branch", "stretch reaches zero")
 """Beginnings of the reasons for which a branch ends, but for those that depend on steps and meshes."""
-LESS = 0.1
-"""Ratio of differences of energies, on finer meshes and on those compared, of one state with the errors of meshes."""
 OTHER = 0.05
 """Relative difference of stored energies of two resolved states that are two equilibria, not one with two errors."""
 FAMILY = "no symmetry of the scene explains"
@@ -357,26 +349,6 @@ def check_asked(first: Diagram, second: Diagram, out: Compared) -> None:
             out.said.append(f"at load {s.point.load:.8g}: two equilibria, of the energies {low:.6g} and {high:.6g}")
         if ratio > 1:
             out.differs.append(f"at load {s.point.load:.8g}: {describe(s)} and {describe(t)}, {ratio:.3g} bars apart")
-        size, unsure = max(abs(low), abs(high)), (s.ordinate_error + t.ordinate_error) / units.ordinate
-        untold = all(abs(x.point.ordinate) <= bars(x)[1] for x in (s, t))
-        if untold:
-            unsure = max(unsure, UNTOLD)
-        if high - low > max(STORED * max(size, 1e-6 * units.energy), OF_ENERGIES * unsure * max(size, units.energy)):
-            if untold and finer((first, s.point), (second, t.point)) < LESS * (high - low):
-                out.unresolved += 1
-                continue
-            out.differs.append(f"at load {s.point.load:.8g}: stored energies {low:.12g} and {high:.12g}")
-
-
-def finer(*given: tuple[Diagram, Point]) -> float:
-    """Difference of the stored energies of states of two traces, on meshes of four times as many elements."""
-    energies = []
-    for diagram, point in given:
-        mesh = diagram.solvers[0].system.fields.discretization
-        mesh = replace(mesh, elements=4 * mesh.elements)
-        again = trace(diagram.scene, mesh, Plan(at=(point.load,), depth=0, error_bars=False))
-        energies.append(min((s.point.energy for s in _asked(again[0])), key=lambda e, of=point.energy: abs(e - of)))  # type: ignore[misc]
-    return abs(energies[1] - energies[0])
 
 
 def _asked(branch: Branch) -> Iterator[SpecialPoint]:
