@@ -23,7 +23,7 @@ from benchmarks.store import Store
 sys.path.append(str(ROOT / "tests"))
 
 from hard.accuracy import PROBLEMS, at
-from hard.case import Case, Measured
+from hard.case import Case, Measured, words
 from hard.cases import CASES
 from hard.fuzz import worker
 
@@ -44,8 +44,7 @@ TITLES = {
 }
 WORDS = {
     "stiffness": "Shear and stretch up to 1e14 times stiffer than bending, one to 100,000 elements, degrees 1 to 12, "
-    "graded meshes, ends turned past 4 pi, stiffness, weight and foundation that vary at random, units of "
-    "a molecule and a pipeline.",
+    "graded meshes, ends turned past 4 pi, stiffness, weight and foundation that vary at random.",
     "bifurcations": "Branch points 1e-12 apart, folds in pairs, cusps, crossings that cancel or touch, imperfections "
     "down to 1e-12, isolas, ranges that begin at a branch point or end at a fold, clusters of up to five "
     "points at random.",
@@ -91,17 +90,9 @@ def summary(case: Case, found: list[dict[str, Any]]) -> list[str]:
         shown = f"{value:g}" if isinstance(value, (int, float)) else str(value)
         by.setdefault(row.get("verdict", row.get("failed", "wrong")), []).append(shown)
     worst = max((r["ratio"] for r in found if r.get("verdict") == "right"), default=None)
-    words = [f"{'**' if kind != 'right' else ''}{kind}{'**' if kind != 'right' else ''}: {', '.join(values)}"
-             for kind, values in by.items()]  # fmt: skip
-    return [
-        case.name,
-        case.of,
-        case.hard,
-        f"{case.promised} ({case.source})",
-        case.parameter,
-        "; ".join(words),
-        digits(worst, 2),
-    ]
+    verdicts = [f"{kind if kind == 'right' else f'**{kind}**'}: {', '.join(values)}" for kind, values in by.items()]
+    name, of, hard, promised, source, parameter = words()[case.name].values()
+    return [name, of, hard, f"{promised} ({source})", parameter, "; ".join(verdicts), digits(worst, 2)]
 
 
 def bars_of(store: Store) -> str:
@@ -184,7 +175,7 @@ def undecided(store: Store) -> str:
                 f"{v:g}" if isinstance(v, (int, float)) else str(v) for v, r in found if r.get("verdict") == "said"
             ]
             if values:
-                rows.append([case.name, case.parameter, ", ".join(values)])
+                rows.append([case.name, words()[case.name]["parameter"], ", ".join(values)])
     return table(["case", "parameter", "said at"], rows)
 
 
@@ -243,9 +234,10 @@ Written by `make bench` (`python -m benchmarks.robustness`) in {store.took() / 6
 {machine()}; {versions("petsc4py", "slepc4py", "numpy", "scipy")}; one thread; {strftime("%Y-%m-%d")}.
 
 Each case is a one-parameter family of problems with a closed form or a published value; `tests/hard` has them, and
-tests some values of each. It tests a row of [the contract](resolution.md). *Right*: what is promised, to the error bars
-that the program gives itself; the last column is the largest error over its bar (or over what is promised). **said**:
-the program says in a sentence what it could not decide. **wrong**: neither; there should be none. In all: {total}.
+tests some values of each. It tests a row of [the contract](resolution.md). *Exact* are all special points, each within
+its error bar, with the index on either side. *Right*: what is promised, to the error bars that the program gives
+itself; the last column is the largest error over its bar (or over what is promised). **said**: the program says in a
+sentence what it could not decide. **wrong**: neither; there should be none. In all: {total}.
 
 {chr(10).join(parts)}
 ## Error bars

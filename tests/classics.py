@@ -443,13 +443,6 @@ def partly_following(share: float, span: tuple[float, float], strong: float = 10
     )  # fmt: skip
 
 
-def leipholz() -> Scene:
-    return column(
-        "leipholz", (clamped(), free()), (30.0, 45.0), follower=push, inertia=BEAM,
-        constants={"P": 30.0, "B2": 10.0},
-    )  # fmt: skip
-
-
 def imperfect_column() -> Scene:
     """An extensible column under a thrust and a constant force across it: its branch is curved from the first row."""
     return Scene(

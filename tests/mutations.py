@@ -163,7 +163,8 @@ TABLE = {
     },
     "rodfem/continuation/singular.py": {
         "eigenvalues-have-the-units-of-loads": (
-            "least[m if self.fold else m - k : m] /= units[0]", "least[m if self.fold else m - k :] /= units[0]", HARD),
+            "least[m if self.fold else m - k : m] /= units[0]", "least[m if self.fold else m - k :] /= units[0]",
+            "problem/test_units.py codim2/test_places.py"),
         "states-drift-along-null-vectors": (
             "rows[:, 0] -= at.Z.T @ at.b[:, 0]", "rows[:, 0] -= 0.0 * at.Z.T @ at.b[:, 0]",
             "continuation/test_unfolding.py"),

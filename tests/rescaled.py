@@ -1,15 +1,11 @@
-"""Scenes stated in other units of length and force; ``python -m tests.rescaled`` compares all recorded scenes.
+"""Scenes stated in other units of length and force, compared with recorded ones.
 
 Parameters keep their values: what they stand for is converted where a scene uses it.  The load has a unit of its own.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 import golden_cases
 
@@ -122,19 +118,3 @@ def _apart(recorded: list[dict[str, Any]], other: rodfem.Diagram, load: float) -
             if abs(s["load"] - t["load"] / load) > 1e-9 * max(1.0, abs(s["load"])):
                 out.append(f"{b['name']}: {s['kind']} at {s['load']:.12g} and {t['load'] / load:.12g}")
     return out
-
-
-def main() -> None:
-    """Compare all recorded scenes, or those whose names hold a word given."""
-    for name in golden_cases.cases():
-        if not sys.argv[1:] or any(word in name for word in sys.argv[1:]):
-            print(
-                name,
-                *("; ".join(differences(name, *units)) or "the same" for units in (DNA, STEEL)),
-                sep=" | ",
-                flush=True,
-            )
-
-
-if __name__ == "__main__":
-    main()

@@ -64,22 +64,30 @@ class Measured:
         return "right" if self.right else "said" if self.said else "wrong"
 
 
+@cache
+def words() -> dict[str, dict[str, str]]:
+    """Rows of ``cases.md`` by the name of the case, each by the heads of its columns.
+
+    One of them is the row of the contract, of "Promised" in docs/resolution.md, that the case tests.
+    """
+    lines = (Path(__file__).parent / "cases.md").read_text().splitlines()
+    head, _, *rows = ([cell.strip() for cell in line.strip("|").split("|")] for line in lines)
+    return {row[0]: dict(zip(head, row, strict=True)) for row in rows}
+
+
 @dataclass(frozen=True)
 class Case:
-    """A series of problems of one kind, by a parameter: the tests run ``few`` of its values, the page ``all``.
+    """A series of problems of one kind, by a parameter: the tests run ``few`` of its values, the page ``all``."""
 
-    ``of`` names what is promised: a row of the contract in docs/resolution.md.
-    """
-
-    of: str
     name: str
-    hard: str
-    promised: str
-    source: str
-    parameter: str
     measure: Callable[[Any], Measured]
     few: tuple[Any, ...]
     all: tuple[Any, ...]
+
+    @property
+    def may_say(self) -> bool:
+        """Whether a sentence that says what is not decided is as good as an answer."""
+        return words()[self.name]["promised"] == "exact or said"
 
 
 ASKED: ContextVar[float | None] = ContextVar("asked", default=None)

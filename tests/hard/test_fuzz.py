@@ -49,8 +49,9 @@ def test_a_random_scene(seed: int, number: int) -> None:
 
     A generic state of great curvature under a cosh energy would hide all forces but its own: a thrust, say.
     """
-    found = compared(scene(seed, number), number, depth=0)
-    assert found.rows > found.unclear
+    rod = scene(seed, number)
+    found = compared(rod, number, depth=0)
+    assert found.rows > found.unclear or not rod.conservative
     assert (found.wrong, found.differs, found.refused) == ([], [], [])
     assert not any("symmetry" in sentence for sentence in found.said)
 

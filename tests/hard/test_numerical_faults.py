@@ -14,7 +14,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import rodfem
-from rodfem import ConvergenceError, Diagram, InputError, Observer, many, run
+from rodfem import ConvergenceError, Diagram, InputError, Observer, run
 from rodfem.adaptivity.error_estimate import Enriched
 from rodfem.continuation import branch_solver
 from rodfem.continuation.branch_solver import BranchSolver
@@ -154,19 +154,6 @@ def test_a_sweep_keeps_what_it_has(
         assert kept.load == other.load and kept.negative == other.negative
         np.testing.assert_allclose(kept.omega2, other.omega2, rtol=1e-6, atol=1e-6)
     assert rodfem.load_json(folder / "diagram.json")["branches"][0]["ended"] == branch.ended
-
-
-def test_many_rods_go_on(folder: Path) -> None:
-    rods = [demo_cases.scene("cord", turns=turns) for turns in (1.0, 1.5, 2.0)]
-
-    def work(rod: rodfem.Scene) -> dict[str, Any]:
-        if rod is rods[1]:
-            raise MemoryError
-        return {"done": True}
-
-    found = many(rods, work, folder, MPI.COMM_WORLD)
-    assert [r.get("done") for r in found] == [True, None, True]
-    assert found[1]["error"].startswith("Memory is exhausted")
 
 
 @pytest.mark.ranks

@@ -8,7 +8,7 @@ from math import acos, inf, sqrt
 from typing import Any
 
 import classics
-from closed_forms import double, flutter
+from closed_forms import double
 from hard.case import Change, Measured, compare, run, said
 
 from rodfem import Diagram, Discretization, End, Inertia, Scene, clamped, free
@@ -16,36 +16,15 @@ from rodfem.forms import loads as springs
 
 MESH = Discretization("pointwise", 4, 6)
 BECK, SHARE = float(double(20.0, 120.0)[0]), 0.4
-"""Beck's load; the share of a thrust that follows a tip, which diverges, comes back, and flutters."""
-DIVERGES, FLUTTERS = acos(-SHARE / (1 - SHARE)) ** 2, flutter(16.4, 21.5, share=SHARE)[0]
+"""Beck's load; the share of a thrust that follows a tip, which diverges."""
+DIVERGES = acos(-SHARE / (1 - SHARE)) ** 2
 AT_ROW, BETWEEN = 5.0, 5.0371
 """Values of the parameter: one of a row of the sweep, and one between two rows."""
-CRITICAL = {"flutter": (BECK, 1.0), "divergence": (DIVERGES, SHARE), "late flutter": (FLUTTERS, SHARE)}
+CRITICAL = {"flutter": (BECK, 1.0), "divergence": (DIVERGES, SHARE)}
 THIN = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.01))
 """Of a rod that resists spinning alone."""
 NEAR = 0.3
 """Of that value: other critical loads are farther away."""
-
-
-def peaked(
-    kind: str,
-    top: float,
-    at: float,
-    mesh: Discretization,
-    curvature: float = 1.0,
-    span: tuple[float, float] = (0.0, 10.0),
-    **plan: Any,
-) -> Diagram:
-    """Sweep whose thrust is ``top`` above the critical one where it is greatest, ``at`` a value of its parameter."""
-    critical, share = CRITICAL[kind]
-
-    def push(part: float) -> Any:
-        return lambda c: (0.0, 0.0, -part * (critical + c.top - c.curvature * (c.p - c.at) ** 2))
-
-    ends = clamped(), free(force=push(1 - share), follower=push(share))
-    constants = {"p": 0.0, "B2": 10.0, "top": top, "at": at, "curvature": curvature}
-    scene = classics.column("peaked", ends, span, load="p", inertia=classics.BEAM, constants=constants)
-    return run(scene, mesh, **plan)
 
 
 def loads(diagram: Diagram, kind: str, at: float) -> list[tuple[float, float]]:
@@ -54,8 +33,16 @@ def loads(diagram: Diagram, kind: str, at: float) -> list[tuple[float, float]]:
 
 
 def pair(kind: str, at: float, top: float) -> Measured:
-    """``at -+ top^(1/2)``, or none where the greatest thrust is below the critical one."""
-    diagram = peaked(kind, top, at, MESH)
+    """``at -+ top^(1/2)``, or none where the greatest thrust, ``top`` above the critical one, is below it."""
+    critical, share = CRITICAL[kind]
+
+    def push(part: float) -> Any:
+        return lambda c: (0.0, 0.0, -part * (critical + c.top - (c.p - c.at) ** 2))
+
+    constants = {"p": 0.0, "B2": 10.0, "top": top, "at": at}
+    ends = clamped(), free(force=push(1 - share), follower=push(share))
+    scene = classics.column("peaked", ends, (0.0, 10.0), load="p", inertia=classics.BEAM, constants=constants)
+    diagram = run(scene, MESH)
     found = loads(diagram, kind, at)
     exact = [at - sqrt(top), at + sqrt(top)] if top > 0 else []
     if len(found) != len(exact):

@@ -31,11 +31,6 @@ def swept(span: tuple[float, float], rotary_inertia: tuple[float, float, float] 
     return branch
 
 
-def test_where_eigenvalues_meet() -> None:
-    assert double(20.0, 120.0) == pytest.approx([20.0509536189738, 121.342510140494], rel=1e-9)
-    assert double(20.0, 120.0, J=1e-3)[0] == pytest.approx(19.8391305740585, rel=1e-9)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(("span", "J"), [((0.0, 25.0), 0.0), ((25.0, 15.0), 1e-3)])
 def test_flutter(span: tuple[float, float], J: float) -> None:

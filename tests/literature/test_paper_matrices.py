@@ -124,24 +124,6 @@ def test_constraints_of_the_mixed_formulation_grow_over_h() -> None:
     assert ratios[1] / ratios[0] == pytest.approx(2, rel=0.02)
 
 
-def test_inverses_of_a_projected_matrix() -> None:
-    """(30)-(32) of a random matrix that is not symmetric, and the saddle's solution in their place."""
-    rng = np.random.default_rng(0)
-    A, C = rng.normal(size=(9, 9)), rng.normal(size=(9, 3))
-    Q = np.linalg.qr(C, mode="complete")[0]
-    one, two, inverse = Q[:, :3], Q[:, 3:], np.linalg.inv(A)
-    expected = np.linalg.inv(two.T @ A @ two)
-    bracket = np.eye(6) - (two.T @ A @ one) @ (one.T @ inverse @ two)
-    middle = np.linalg.inv(one.T @ inverse @ one)
-    saddle = np.block([[A, C], [C.T, np.zeros((3, 3))]])
-    for found in (
-        two.T @ inverse @ two @ np.linalg.inv(bracket),
-        two.T @ inverse @ two - two.T @ inverse @ one @ middle @ one.T @ inverse @ two,
-        two.T @ np.linalg.inv(saddle)[:9, :9] @ two,
-    ):
-        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10)
-
-
 def test_cayley_transform() -> None:
     """(29), with the parameters of section 5, of the eigenvalues themselves."""
     values = np.array([-3.0, 0.5, 0.7, 4.0, 50.0])

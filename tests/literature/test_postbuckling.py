@@ -10,13 +10,18 @@ import pytest
 from classics import ON_AXIS, column, push
 
 import rodfem
-from rodfem import Diagram, Discretization, Ordinate, Plan, Ring, clamped, pinned, sliding
+from rodfem import Diagram, Discretization, Ordinate, Plan, Ring, SpecialPoint, clamped, pinned, sliding
+from rodfem.continuation.normal_form import NormalForm
 from rodfem.forms.energy import bending_and_twist
 
 ACROSS = Ordinate("middle", s=0.5, of=lambda r, q: float(r[0]))
 PINNED = (pinned(), pinned(ON_AXIS, push))
 ONCE = Plan(depth=1)
 Energy = Any
+
+
+def linear(v: Any, k: Any, c: Any) -> Any:
+    return bending_and_twist(k, (9.0, 1.0, 1.0))
 
 
 def traced(span: tuple[float, float], energy: Energy, constants: dict[str, float], **more: Any) -> Diagram:
@@ -26,9 +31,17 @@ def traced(span: tuple[float, float], energy: Energy, constants: dict[str, float
     return rodfem.trace(column("postbuckling", ends, span, **given), plan=plan)
 
 
+def check_law(special: SpecialPoint, kind: str, coefficient: float, most: float) -> NormalForm:
+    """The law by which a branch leaves, of this ``kind`` and ``coefficient`` within less than ``most``."""
+    law = special.law
+    assert law is not None and law.kind == kind
+    assert abs(law.coefficient - coefficient) <= law.uncertainty < most
+    return law
+
+
 def quartic(v: Any, k: Any, c: Any) -> Any:
     """Not linear: ``k^2/2 + beta k^4``."""
-    return bending_and_twist(k, (9.0, 1.0, 1.0)) + c.beta * k[1] ** 4
+    return linear(v, k, c) + c.beta * k[1] ** 4
 
 
 @pytest.mark.long
@@ -37,9 +50,7 @@ def test_material_that_is_not_linear(beside: float) -> None:
     """For ``k^2/2 + beta k^4`` ``P = pi^2 + pi^4/8 (1 + 24 beta pi^2) x^2``: subcritical below -1/(24 pi^2)."""
     beta = -beside / (24 * pi**2)
     (found,) = traced((9.0, 10.5), quartic, {"beta": beta}).special("branch point", "straight")
-    assert found.law is not None
-    assert found.law.kind == ("supercritical pitchfork" if beside < 1 else "subcritical pitchfork")
-    assert abs(found.law.coefficient - pi**4 / 8 * (1 - beside)) <= found.law.uncertainty < 1e-5
+    check_law(found, f"{'super' if beside < 1 else 'sub'}critical pitchfork", pi**4 / 8 * (1 - beside), 1e-5)
 
 
 @pytest.mark.long
@@ -51,7 +62,7 @@ def test_column_that_stretches(excess: float) -> None:
     for the slope ``A cos(pi s)``, and the middle moves by ``(1 - P/EA) A/pi``: subcritical for EA below 16 pi^2/3.
     """
     EA = 4 * pi**2 * (1 + excess)
-    energy = lambda v, k, c: c.EA / 2 * (v[2] - 1) ** 2 + bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
+    energy = lambda v, k, c: c.EA / 2 * (v[2] - 1) ** 2 + linear(v, k, c)  # noqa: E731
     loads = [EA / 2 * (1 + side * sqrt(1 - 4 * pi**2 / EA)) for side in (-1, 1)]
     margin = loads[1] - loads[0]
     diagram = traced((loads[0] - margin, loads[1] + margin), energy, {"EA": EA}, rod="unshearable")
@@ -61,9 +72,7 @@ def test_column_that_stretches(excess: float) -> None:
         assert abs(special.point.load - P) <= special.error_estimate
         expected = 3 * pi**2 * (P / 24 - P * P / (6 * EA)) / ((1 - 2 * P / EA) * (1 - P / EA) ** 2)
         supercritical = expected > 0 and P < EA / 2
-        assert special.law is not None
-        assert special.law.kind == f"{'super' if supercritical else 'sub'}critical pitchfork"
-        assert abs(special.law.coefficient - expected) <= special.law.uncertainty < 1e-3 * abs(expected)
+        check_law(special, f"{'super' if supercritical else 'sub'}critical pitchfork", expected, 1e-3 * abs(expected))
 
 
 @pytest.mark.long
@@ -71,25 +80,21 @@ def test_buckling_in_tension() -> None:
     """Under a tension T a column that shears buckles supercritically: the law with ``T (T/GA - 1)``, ``T^2/(6 GA)``."""
     GA = 10.0
     T = (GA + sqrt(GA * GA + 4 * GA * pi**2)) / 2
-    energy = lambda v, k, c: c.GA / 2 * (v[0] ** 2 + v[1] ** 2) + bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
+    energy = lambda v, k, c: c.GA / 2 * (v[0] ** 2 + v[1] ** 2) + linear(v, k, c)  # noqa: E731
     diagram = traced((-15.0, -17.0), energy, {"GA": GA, "P": -15.0}, rod="inextensible")
     (found,) = diagram.special("branch point", diagram.branches[0].name)
     expected = -3 * pi**2 * (T * T / (6 * GA) - T / 24) / ((2 * T / GA - 1) * (T / GA - 1) ** 2)
-    assert found.law is not None
-    assert found.law.kind == "supercritical pitchfork"
-    assert abs(found.law.coefficient - expected) <= found.law.uncertainty < 1e-4
+    check_law(found, "supercritical pitchfork", expected, 1e-4)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("of", [lambda r, q: 0.0, lambda r, q: float(r[1]), lambda r, q: float(r[0]) ** 4])
 def test_ordinate_that_does_not_change(of: Any) -> None:
     """``P = pi^2 + pi^2/4 a^2`` whatever the ordinate is: ``a^2`` is the integral of the square of the angle."""
-    linear = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
     diagram = traced((9.0, 10.5), linear, {}, ordinate=Ordinate("nothing", s=0.5, of=of))
     (found,) = diagram.special("branch point", "straight")
-    assert found.law is not None
-    assert (found.law.kind, found.law.power, found.law.of) == ("supercritical pitchfork", 2, "distance")
-    assert abs(found.law.coefficient - pi**2 / 4) <= found.law.uncertainty < 1e-6
+    law = check_law(found, "supercritical pitchfork", pi**2 / 4, 1e-6)
+    assert (law.power, law.of) == (2, "distance")
     assert "where it buckles supercritically;" in diagram.in_words()
 
 
@@ -99,14 +104,11 @@ def test_size_of_a_displacement_at_a_transcritical_point() -> None:
 
     Where a potential depends on the position that is an unknown, too: ``a^2`` has the factor ``1 + 1/pi^2``.
     """
-    linear = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
     size = Ordinate("size", s=0.5, of=lambda r, q: abs(float(r[0])))
     diagram = traced((9.5, 10.5), linear, {"k": 1.0}, ordinate=size, potential=lambda x, c: c.k * x.r[0] ** 3)
     (found,) = diagram.special("branch point", "straight")
-    assert found.law is not None
-    assert (found.law.kind, found.law.of) == ("transcritical", "distance")
     expected = 8 / pi**3 * sqrt(2) / pi / sqrt(1 + 1 / pi**2)
-    assert abs(found.law.coefficient - expected) <= found.law.uncertainty < 1e-4
+    assert check_law(found, "transcritical", expected, 1e-4).of == "distance"
 
 
 @pytest.mark.few(1)
@@ -138,11 +140,9 @@ def test_foundation_that_is_softer_on_one_side(beta: float, folds: int) -> None:
     There the branch begins beyond it.
     """
     slope = 8 * beta / pi**3
-    energy = lambda v, k, c: bending_and_twist(k, (9.0, 1.0, 1.0))  # noqa: E731
-    diagram = traced((9.5, 10.5), energy, {"k": beta}, potential=lambda x, c: c.k * x.r[0] ** 3)
+    diagram = traced((9.5, 10.5), linear, {"k": beta}, potential=lambda x, c: c.k * x.r[0] ** 3)
     (point,) = diagram.special("branch point", "straight")
-    assert point.law is not None and point.law.kind == "transcritical"
-    assert abs(point.law.coefficient - slope) <= point.law.uncertainty < 1e-3 * slope
+    check_law(point, "transcritical", slope, 1e-3 * slope)
     assert [b.name for b in diagram] == ["straight", "branch 1", "branch 2"]
     assert np.sign([b.points[-1].ordinate for b in diagram.branches[1:]]).tolist() == [1.0, -1.0]
     assert [b.points[-1].stable for b in diagram.branches[1:]] == [False, True]

@@ -15,7 +15,6 @@ import numpy as np
 
 from rodfem import Branch, Diagram, Discretization, Plan, Point, Scene, SpecialPoint, StepControl, trace
 from rodfem.continuation.kinds import EVENT
-from rodfem.diagram.sweep import FREQUENCIES
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.system import System
 from rodfem.tolerances import round_off
@@ -28,12 +27,6 @@ OF_A_RING = 1e-2
 """The second where a closed rod may move along itself: the mesh's eigenvalue of that motion."""
 COLLAPSED = 1e-9
 """Stretch, at its least along the rod, at which the null space of the constraints of an unshearable rod is another."""
-LAST = 0.99
-"""Share of the greatest recorded frequencies below which none is missing."""
-SQUARE = 1e-5
-"""Relative difference of two values of omega^2 that are one: double ones have half of the digits."""
-SURE = 0.1
-"""Part of that which may be round-off of the dense eigenvalues."""
 ROWS = 40, 12
 """Most rows of the first and of the second trace that are counted, spread over all of them."""
 MOST_BRANCHES = 7
@@ -104,8 +97,8 @@ def compared(scene: Scene, number: int = 0, depth: int = 1) -> Compared:
             continue
         diagrams.append(diagram)
         out.said += open_questions(diagram)
-        check_rows(diagram, out, most)
         if scene.conservative:
+            check_rows(diagram, out, most)
             for branch in diagram:
                 check_chain(branch, out)
     if len(diagrams) == 2:
@@ -161,11 +154,7 @@ def check_rows(diagram: Diagram, out: Compared, most: int) -> None:
     for j in np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int)):
         branch, i, point = rows[j]
         out.rows += 1
-        if not diagram.scene.conservative:
-            doubted = id(point) in special
-            fault = None if doubted else frequencies_of(oracle, point)
-        else:
-            fault = index_of(oracle, system, point, id(point) in special)
+        fault = index_of(oracle, system, point, id(point) in special)
         if fault is None:
             out.unclear += 1
         elif fault:
@@ -190,28 +179,6 @@ def index_of(oracle: Oracle, system: System, point: Point, special: bool) -> str
         return None
     least = ", ".join(f"{m:.3g}" for m in mu[: negative + zero + 2])
     return f"recorded ({point.negative}, {point.zero}), dense ({negative}, {zero}) of {least}"
-
-
-def frequencies_of(oracle: Oracle, point: Point) -> str | None:
-    """What dense linear algebra denies of the recorded eigenvalues, or of their number; None where two nearly meet."""
-    dense, one = oracle.squares(point.x), oracle.system.scene.units.omega2
-    mine = np.array([complex(*value) for value in point.omega2])
-    mine = mine[abs(mine) > NEAR * one]
-    if not len(mine):
-        return None
-    apart = abs(mine[:, None] - dense).min(axis=1) / np.maximum(abs(mine), one)
-    dense = dense[abs(dense) > NEAR * one]
-    close = [abs(a - b) < 1e-3 * max(abs(a), one) for a, b in pairwise(sorted(dense[:FREQUENCIES], key=abs))]
-    unsure = oracle.noise > SURE * SQUARE or any(close)
-    if apart.max() > SQUARE:
-        worst = int(apart.argmax())
-        return None if unsure else f"omega^2 = {mine[worst]:.8g} is none of {dense[:FREQUENCIES]}"
-    last = mine.real.max() - (1 - LAST) * abs(mine.real.max())  # the last one may be half of a pair
-    among = dense[(abs(dense) < LAST * abs(mine).max()) & (dense.real < last)]
-    missing = among[(abs(among[:, None] - mine) > SQUARE * np.maximum(abs(among), one)[:, None]).all(axis=1)]
-    if len(missing):
-        return None if unsure else f"omega^2 = {missing[0]:.8g} is missing among {mine}"
-    return ""
 
 
 def check_chain(branch: Branch, out: Compared) -> None:

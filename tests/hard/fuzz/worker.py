@@ -1,6 +1,13 @@
-"""Scenes one by one in a child process, a line of results for each, and all in a few lines."""
+"""Random scenes through the public interface: ``python -m tests.hard.fuzz --seed 1 --scenes 500``.
 
+Each scene is worked on in a child process, which is replaced where it takes too long or dies.  A line of JSON a scene
+is added to ``results/fuzz-SEED.jsonl`` (or ``--output FILE``); scenes that have one are not repeated.  ``--only N``
+works on one scene and prints what it shows.
+"""
+
+import argparse
 import json
+import sys
 import time
 import traceback
 from collections import Counter
@@ -18,6 +25,8 @@ Entry = dict[str, Any]
 COMPARED, REFUSED, CRASHED, HUNG = "compared", "refused", "crashed", "hung"
 RENEWED = 12
 """Scenes of one child: compiled forms stay in its memory."""
+LIMIT = 300.0
+"""Seconds of a scene."""
 
 
 def examine(seed: int, number: int, depth: int = 1) -> Entry:
@@ -75,3 +84,25 @@ def in_words(entries: Sequence[Entry]) -> str:
         f"{len(ratios)} pairs of special points, {sum(ratio <= 1 for ratio in ratios)} within the sum of their bars, "
         f"the largest ratios {ratios[-5:]}"
     )
+
+
+def main() -> None:
+    """Run what is asked for."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.hard.fuzz", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--scenes", type=int, default=100, help="scenes 0 to this of the seed")
+    parser.add_argument("--depth", type=int, default=1)
+    parser.add_argument("--limit", type=float, default=LIMIT, help="seconds of a scene")
+    parser.add_argument("--output", type=Path)
+    parser.add_argument("--only", type=int, help="number of the only scene, in this process")
+    given = parser.parse_args()
+    if given.only is not None:
+        print(json.dumps(examine(given.seed, given.only, given.depth), indent=1))
+    else:
+        file = given.output or Path("results") / f"fuzz-{given.seed}.jsonl"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        entries = run(file, given.seed, given.scenes, given.depth, given.limit)
+        print(in_words(entries))
+        sys.exit(any(is_fault(entry) for entry in entries))
