@@ -7,8 +7,9 @@ of a pendulum), and shortens the rod by ``2 (1 - cos(ANGLE/2)) / sqrt(T)``; the 
 
 from math import cos, pi, sin
 
-from rodfem import Ordinate, Parameter, Scene, clamped, sliding
-from rodfem.forms.energy import bending_and_twist
+from classics import column
+
+from rodfem import Ordinate, Scene, clamped, sliding
 
 ANGLE = pi / 3
 
@@ -16,20 +17,9 @@ ANGLE = pi / 3
 def scene(span: tuple[float, float] = (3.0, 6.0)) -> Scene:
     """The rod with the exponent of its tension as the load."""
     turned = (cos(ANGLE / 2), 0.0, sin(ANGLE / 2), 0.0)
-    return Scene(
-        name="taut",
-        interval=(0.0, 1.0),
-        rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 1.0, 1.0)),
-        parameters={"lam": Parameter(span[0])},
-        load="lam",
-        ends=(
-            clamped(rotation=turned),
-            sliding(lambda c: (None, None, None), turned, force=lambda c: (0.0, 0.0, 10.0**c.lam)),
-        ),
-        ordinate=Ordinate("shortening", s=1.0, of=lambda r, q: 1 - r[2]),
-        span=span,
-    )
+    ends = clamped(rotation=turned), sliding(lambda c: (None, None, None), turned, lambda c: (0.0, 0.0, 10.0**c.lam))
+    constants, ordinate = {"lam": span[0], "B2": 1.0}, Ordinate("shortening", s=1.0, of=lambda r, q: 1 - r[2])
+    return column("taut", ends, span, load="lam", constants=constants, ordinate=ordinate)
 
 
 def shortening(lam: float) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rows import verify
 
-from rodfem import Branch, Discretization, Plan, Point, Scene, trace
+from rodfem import Diagram, Discretization, Plan, Scene, trace
 
 FUNCTIONS = {"cord": "cord", "ruler": "ruler", "ring": "ring", "follower": "pushed_rod"}
 """Functions that state the demos' scenes."""
@@ -33,27 +33,13 @@ def scene(name: str, **constants: Any) -> Scene:
     return made if span is None else replace(made, span=span)
 
 
-class Found:
-    """Branches of a demo, their follower and scene."""
-
-    def __init__(self, scene: Scene, discretization: Discretization, depth: int, at: tuple[float, ...]) -> None:
-        """Explore the scene over its own span."""
-        diagram = trace(scene, discretization, Plan(at=at, depth=depth))
-        self.scene, self.follower, self.branches = scene, diagram.solvers[0], diagram.branches
-        verify(self.follower, self.branches)
-
-    def __getitem__(self, name: str) -> Branch:
-        """Branch of that name."""
-        (branch,) = [b for b in self.branches if b.name == name]
-        return branch
-
-    def start_of_rod(self, point: Point) -> tuple[np.ndarray, np.ndarray]:
-        """Contact force (nan where it is known) and strains ``k`` at s = 0, where the directors are e1, e2, e3."""
-        sample = self.follower.shape.sample(point.x)
-        nodes = self.follower.system.fields.discretization.degree + 1
-        s, q = sample["s"][:nodes], sample["q"][:nodes]
-        k = [2 * np.polyder(np.polyfit(s, q[:, i], nodes - 1))[-1] for i in (1, 2, 3)]
-        return np.array([sample.get(f"n{i}", np.nan) for i in (1, 2, 3)]), np.array(k)
+def start_of_rod(diagram: Diagram, x: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Contact force (nan where it is known) and strains ``k`` of a state at s = 0, where directors are e1, e2, e3."""
+    solver = diagram.solvers[0]
+    sample, nodes = solver.shape.sample(x), solver.system.fields.discretization.degree + 1
+    s, q = sample["s"][:nodes], sample["q"][:nodes]
+    k = [2 * np.polyder(np.polyfit(s, q[:, i], nodes - 1))[-1] for i in (1, 2, 3)]
+    return np.array([sample.get(f"n{i}", np.nan) for i in (1, 2, 3)]), np.array(k)
 
 
 @cache
@@ -65,6 +51,8 @@ def explored(
     depth: int = 2,
     at: tuple[float, ...] = (),
     **constants: Any,
-) -> Found:
-    """Explore a demo, once for each set of arguments."""
-    return Found(scene(name, **constants), Discretization(formulation, elements, degree), depth, at)
+) -> Diagram:
+    """Explore a demo over its own span, once for each set of arguments."""
+    diagram = trace(scene(name, **constants), Discretization(formulation, elements, degree), Plan(at=at, depth=depth))
+    verify(diagram.solvers[0], diagram.branches)
+    return diagram

@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import cache
 from math import pi
 from pathlib import Path
-from types import SimpleNamespace
 
 import classics
 import closed_form_hemitropic
@@ -16,6 +15,7 @@ import ufl
 from closed_forms import double, flutter
 from demo_cases import explored as demo
 from demo_cases import scene as demo_scene
+from demo_cases import start_of_rod
 from hard.two_freedoms import scene as two_freedoms
 from hemitropic_cases import explored, follower, specials
 from mpi4py import MPI
@@ -77,12 +77,12 @@ def test_fold_of_the_cord_by_shooting() -> None:
     """The state depends on both parameters; the fold by shooting is where its determinant vanishes, in the moment."""
     cord = demo("cord")
     (fold,) = specials(cord["branch 2"], "fold")
-    found = locus(cord.follower, fold, "k0", ((4.0, 13.0), (8.0, 11.0)), steps=WIDE, error_bars=3)
+    found = locus(cord.solvers[0], fold, "k0", ((4.0, 13.0), (8.0, 11.0)), steps=WIDE, error_bars=3)
     assert found.values[[0, -1], 0].tolist() == [4.0, 13.0]
     assert found.values[found.start, 0] == pytest.approx(7.8065554232, abs=1e-8)
     for row in (0, len(found.values) - 1):
         lam, k0 = found.values[row]
-        n, k = cord.start_of_rod(SimpleNamespace(x=found.states[row]))  # type: ignore[arg-type]
+        n, k = start_of_rod(cord, found.states[row])
         rod = Problem(Rod(intrinsic=(0.0, k0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])
         p = np.array([n[0], n[1], lam, k[0], k[1] - k0, k[2]])
 

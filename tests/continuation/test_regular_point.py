@@ -18,7 +18,7 @@ def demo(name: str, formulation: str) -> tuple[BranchSolver, list[Branch]]:
     if name == "hemitropic":
         return hemitropic_cases.follower(formulation, 8, 6), hemitropic_cases.explored(formulation, 8, 6)
     found = demo_cases.explored(name, formulation)
-    return found.follower, found.branches
+    return found.solvers[0], found.branches
 
 
 @pytest.mark.ranks

@@ -7,18 +7,18 @@ import classics
 import hemitropic_cases
 import numpy as np
 import pytest
-from demo_cases import Found, explored, scene
+from demo_cases import explored, scene, start_of_rod
 from literature.test_cord import default
 from rescaled import DNA, rescaled
 from shooting_solver import Problem, Rod
 
-from rodfem import Discretization, InputError, Plan, Point, Solver, pinned, trace
+from rodfem import Diagram, Discretization, InputError, Plan, Point, Solver, pinned, trace
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.deflation.search import NEW, Deflation, equilibria_at, turned_state
 from rodfem.deflation.symmetries import mirrors
 
 
-def ruler() -> Found:
+def ruler() -> Diagram:
     return explored("ruler", "reduced", at=(5.95, 6.0, 6.05))
 
 
@@ -40,9 +40,9 @@ def force(follower: BranchSolver, x: object) -> float:
 def test_cord() -> None:
     """From the straight state alone: all that exploring finds, and whatever else is found is an equilibrium."""
     found = default()
-    known = equilibria_at(found.follower, found.branches, 40.0)
+    known = equilibria_at(found.solvers[0], found.branches, 40.0)
     assert len(known) == 4
-    search = Deflation(found.follower, 40.0, [p for p in known if abs(p.ordinate) < 1e-9])
+    search = Deflation(found.solvers[0], 40.0, [p for p in known if abs(p.ordinate) < 1e-9])
     new = search.run(24)
     for p in known:
         if abs(p.ordinate) > 1e-9:
@@ -50,7 +50,7 @@ def test_cord() -> None:
             assert (match.negative, match.zero) == (p.negative, p.zero)
     assert not [p for p in new if abs(p.ordinate) < 1e-9]
     for p in new:
-        n, k = found.start_of_rod(p)
+        n, k = start_of_rod(found, p.x)
         guess = np.array([n[0], n[1], p.load, k[0], k[1] - 3 * np.pi, k[2]])
         rod = Rod(intrinsic=(0.0, 3 * np.pi, 0.0))
         q, end = Problem(rod, rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5]).solve(guess)
@@ -85,7 +85,7 @@ def test_a_column_that_hangs(planar: str | None) -> None:
 
 def test_known_state_at_another_load() -> None:
     with pytest.raises(InputError, match=r"not 6\.5"):
-        Deflation(ruler().follower, 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))
+        Deflation(ruler().solvers[0], 6.5, hemitropic_cases.user_points(ruler()["plane"], 6.0))
 
 
 @pytest.mark.ranks
@@ -125,7 +125,7 @@ def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
 @pytest.mark.ranks
 def test_step_is_newtons_for_the_deflated_equations() -> None:
     """The rescaled step ``d`` solves ``G'(x) d = -G(x)``, with ``G'`` by differences, next to points and to circles."""
-    for follower, load in ((ruler().follower, 6.0), (hemitropic_cases.follower(), 0.35)):
+    for follower, load in ((ruler().solvers[0], 6.0), (hemitropic_cases.follower(), 0.35)):
         search = Deflation(follower, load)
         search.run(3)
         system = follower.system
@@ -157,10 +157,10 @@ def test_step_is_newtons_for_the_deflated_equations() -> None:
 
 @pytest.mark.ranks
 def test_guesses_do_not_depend_on_ranks() -> None:
-    system = ruler().follower.system
-    straight = ruler().follower.start(1.0)
+    system = ruler().solvers[0].system
+    straight = ruler().solvers[0].start(1.0)
     x = turned_state(system, straight, 1.0, [0, 7])
-    q = ruler().follower.shape.sample(x)["q"]
+    q = ruler().solvers[0].shape.sample(x)["q"]
     assert q[0] == pytest.approx([1, 0, 0, 0], abs=1e-15)
     assert np.linalg.norm(q, axis=1) == pytest.approx(1, abs=1e-14)
     assert q[24] == pytest.approx([0.80094931574151, -0.54006580455896, 0.24587627411001, -0.07971184], abs=1e-8)

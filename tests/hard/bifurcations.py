@@ -8,7 +8,7 @@ from classics import SUPPORTS, column
 from continuation.test_unfolding import cantilever, fold_of
 from hard.case import Change, Measured, compare, run, said, singular
 from hard.stiffness import EULER
-from hard.two_freedoms import scene
+from hard.two_freedoms import cubic, scene
 
 from rodfem import Discretization, Ordinate, Scene, clamped, free
 from rodfem.continuation.kinds import IMPERFECT
@@ -27,10 +27,8 @@ def neighbours(apart: float) -> Measured:
 
 
 def folds(apart: float) -> Measured:
-    """``u^3 - a u = P``: folds at ``u = -+(a/3)^(1/2)``, where P = +-2 (a/3)^(3/2)."""
-    a = 3 * (apart / 4) ** (2 / 3)
-    model = scene(lambda u, f2, c: 0.25 * u**4 - 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, (-0.1, 0.1), a=a)
-    diagram = run(model, MESH)
+    """Two folds, ``apart`` in load."""
+    diagram = run(cubic(3 * (apart / 4) ** (2 / 3), (-0.1, 0.1)), MESH)
     return compare(singular(diagram[0]), [Change(apart / 2, 0, 1), Change(-apart / 2, 1, 0)], said(diagram))
 
 
@@ -50,8 +48,7 @@ def dent(width: float) -> Measured:
 
 def cusp(a: float) -> Measured:
     """``u^3 + a u = P`` without a fold."""
-    model = scene(lambda u, f2, c: 0.25 * u**4 + 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, (-0.1, 0.1), a=a)
-    diagram = run(model, MESH)
+    diagram = run(cubic(-a, (-0.1, 0.1)), MESH)
     return compare(singular(diagram[0]), [], said(diagram))
 
 

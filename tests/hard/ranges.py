@@ -6,7 +6,7 @@ import numpy as np
 from classics import SUPPORTS, column
 from hard.case import Change, Measured, compare, run, said, singular
 from hard.stiffness import EULER
-from hard.two_freedoms import scene
+from hard.two_freedoms import cubic
 
 from rodfem import Discretization
 
@@ -51,8 +51,7 @@ def turning(short: float, height: float = HEIGHT) -> Measured:
     """
     a = 3 * (height / 2) ** (2 / 3)
     high = height * (1 - short)
-    model = scene(lambda u, f2, c: 0.25 * u**4 - 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, (-0.1, high), a=a)
-    diagram = run(model, MESH)
+    diagram = run(cubic(a, (-0.1, high)), MESH)
     (branch,) = diagram
     u = np.roots([1.0, 0.0, -a, -high]).real.min()
     outside = max(p.load for p in branch.points) > high

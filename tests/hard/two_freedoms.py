@@ -34,3 +34,8 @@ def scene(potential: Potential, span: tuple[float, float], **constants: float) -
         constants={"P": span[0], "B1": STIFF, "a": 0.0, "b": 0.0} | constants,
         ordinate=Ordinate("stretch", s=1.0, of=lambda r, q: r[2] - 1),
     )  # fmt: skip
+
+
+def cubic(a: float, span: tuple[float, float]) -> Scene:
+    """``u^3 - a u = P``: folds at ``u = -+(a/3)^(1/2)``, where P = +-2 (a/3)^(3/2); none for a negative ``a``."""
+    return scene(lambda u, f2, c: 0.25 * u**4 - 0.5 * c.a * u**2 - c.P * u + 0.5 * f2, span, a=a)

@@ -4,14 +4,16 @@ from math import pi
 
 import pytest
 from closed_forms import coil, tensions
-from demo_cases import Found, explored
+from demo_cases import explored
 from hemitropic_cases import specials
+
+from rodfem import Diagram
 
 AT = (39.9, 40.0, 40.1)
 
 
-def default(formulation: str = "reduced") -> Found:
-    return explored("cord", formulation, at=AT)
+def default() -> Diagram:
+    return explored("cord", at=AT)
 
 
 @pytest.mark.few(1)

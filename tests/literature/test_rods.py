@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 import ufl
-from classics import FORMULATIONS, ON_AXIS, ROUND, circle, column, explore, push, sweep
+from classics import BEAM, FORMULATIONS, ON_AXIS, ROUND, circle, column, explore, partly_following, push, sweep
 from closed_forms import flutter
 from scipy.special import fresnel
 
 import rodfem
-from rodfem import Discretization, Inertia, Ordinate, Ring, Scene, at, clamped, free, hinged, pinned, sliding
+from rodfem import Discretization, Ordinate, Ring, Scene, at, clamped, free, hinged, pinned, sliding
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist, logarithmic_stretch
 
-MASS = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0))
 AWAY = Ordinate("distance", s=1.0, of=lambda r, q: float(np.linalg.norm(r)))
 
 
@@ -52,7 +51,7 @@ def test_divergence_and_flutter_in_one_step(span: tuple[float, float]) -> None:
     k, forth = 60.0, 1 if span[0] < span[1] else -1
     spring: Any = lambda x, c: loads.spring(x.r, (0.0, c.k, 0.0))  # noqa: E731
     rod = column(
-        "sprung", (clamped(), free(follower=push, energy=spring)), span, inertia=MASS,
+        "sprung", (clamped(), free(follower=push, energy=spring)), span, inertia=BEAM,
         constants={"P": span[0], "B2": 90.0, "k": k},
     )  # fmt: skip
     diagram = rodfem.trace(rod, Discretization(elements=4, degree=6))
@@ -73,11 +72,7 @@ def test_divergence_beside_flutter(share: float) -> None:
     """
     w = acos(-share / (1 - share))
     flutters, mu = flutter(17.0, 600 * (share - 0.35431), share=share)
-    rod = column(
-        "partly", (clamped(), free(lambda c: (0, 0, -(1 - c.k) * c.P), follower=lambda c: (0, 0, -c.k * c.P))),
-        (0.0, 20.0), inertia=MASS, constants={"B2": 90.0, "k": share},
-    )  # fmt: skip
-    diagram = rodfem.trace(rod, Discretization(elements=4, degree=6))
+    diagram = rodfem.trace(partly_following(share, (0.0, 20.0), 90.0), Discretization(elements=4, degree=6))
     expected = [(w**2, 0, 1), ((2 * pi - w) ** 2, 1, 0), (flutters, 0, 2)]
     assert 0 < flutters / expected[1][0] - 1 < 7e-5 and mu > 0
     for s, (load, *change) in zip(diagram.special(), expected, strict=True):
@@ -90,7 +85,7 @@ def test_divergence_beside_flutter(share: float) -> None:
 def test_hauger() -> None:
     """Tangential thrust ``P (1 - s)`` along a rod that bends alike in all planes, by Galerkin's method."""
     thrust: Any = lambda c: (0.0, 0.0, -c.P * (1 - c.s))  # noqa: E731
-    rod = column("hauger", (clamped(), free()), (140.0, 160.0), follower=thrust, inertia=MASS, constants={"B2": 1.0})
+    rod = column("hauger", (clamped(), free()), (140.0, 160.0), follower=thrust, inertia=BEAM, constants={"B2": 1.0})
     assert sweep(rod, elements=8).loads("flutter") == pytest.approx([150.64159540451925], rel=1e-10)
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from demo_cases import Found, explored
+from demo_cases import explored
 from hemitropic_cases import specials, user_points
 
-from rodfem.continuation.branch import Point
+from rodfem import Diagram, Point
 
 PLANE = {  # load: place of the tip along e1 and e3, energy
     5.95: (0.21950426791788374, 1.0355171287996603, 0.6850578789534028),
@@ -14,12 +14,12 @@ PLANE = {  # load: place of the tip along e1 and e3, energy
 }
 
 
-def default(formulation: str = "reduced") -> Found:
-    return explored("ruler", formulation, at=tuple(PLANE))
+def default() -> Diagram:
+    return explored("ruler", at=tuple(PLANE))
 
 
-def tip(found: Found, point: Point) -> np.ndarray:
-    return found.follower.shape.sample(point.x)["r"][-1]
+def tip(found: Diagram, point: Point) -> np.ndarray:
+    return found.solvers[0].shape.sample(point.x)["r"][-1]
 
 
 def test_bending_in_the_plane() -> None:
