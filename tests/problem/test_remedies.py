@@ -13,14 +13,10 @@ from mpi4py import MPI
 import rodfem
 from rodfem.app.cli import Parser
 from rodfem.app.main import Statement, parser_of
-from rodfem.errors import SMALLER_STEPS, ConvergenceError, InputError, SceneError, SetupError
+from rodfem.errors import SMALLER_STEPS
 from rodfem.fem.formulations import AUTO, FORMULATIONS
 
 HOME = Path(__file__).parents[2] / "rodfem"
-COMMAND_LINE = ("app/cli.py", "app/main.py", "app/console.py")
-PROGRAMS = (*COMMAND_LINE, "output/plot_diagram.py", "output/render.py")
-"""Modules that are run themselves, and may know their own options."""
-
 pytestmark = pytest.mark.versions
 
 
@@ -47,25 +43,11 @@ def test_every_argument_exists_and_has_an_option() -> None:
         assert name in ("most_branches", "most") or parser().option(name).startswith("--")  # which only Python has
 
 
-def test_no_other_module_knows_options() -> None:
-    known = [name for action in parser()._actions for name in action.option_strings if name.startswith("--")]
-    options = re.compile(rf"(?:{'|'.join(known)})\b")
-    for path in HOME.rglob("*.py"):
-        if not str(path.relative_to(HOME)).startswith(PROGRAMS):
-            strings = [n.value for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Constant)]
-            assert not [s for s in strings if isinstance(s, str) and "``--" not in s and options.search(s)], path
-
-
 def test_words_of_python_and_of_the_command_line() -> None:
     assert parser().in_options(f"{SMALLER_STEPS} or Plan(depth=3).") == "use smaller steps (--step) or --depth 3."
     assert parser().in_options("use Discretization(formulation='pointwise')") == "use --formulation pointwise"
     for unknown in ("use Event(name=...)", "use StepControl(smallest=...)"):
         assert parser().in_options(unknown) == unknown
-
-
-def test_classes_of_errors() -> None:
-    assert issubclass(SceneError, InputError) and issubclass(InputError, ValueError)
-    assert all(issubclass(kind, RuntimeError) for kind in (ConvergenceError, SetupError))
 
 
 def test_terminal_of_the_command_line_names_options(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -82,11 +64,3 @@ def test_all_formulations_are_named() -> None:
     assert "{" + ",".join((AUTO, *FORMULATIONS)) + "}" in words
     for name, made in FORMULATIONS.items():
         assert made.name == name and f"`{name}`" in page and f"{name}: {made.words}" in words
-
-
-def test_no_other_module_compares_names_of_formulations() -> None:
-    """A formulation is asked, not recognised."""
-    for path in HOME.rglob("*.py"):
-        text = path.read_text()
-        for name in FORMULATIONS:
-            assert f'== "{name}"' not in text and f'!= "{name}"' not in text, path

@@ -125,16 +125,6 @@ def test_what_elements_do_not_see_is_said() -> None:
 
 
 @pytest.mark.ranks
-def test_a_layer_in_an_element_stays_positive() -> None:
-    """Polynomials overshoot a stiffness that rises by fifty within 0.01: they are drawn to its mean."""
-    s = np.linspace(0.0, 1.0, 1001)
-    EI = 1 + 50 * np.exp(-(((s - 0.6) / 0.01) ** 2))
-    expected = buckling(lambda x: np.interp(x, s, EI), s, 4)
-    loads = [found(column(tabulated(s, EI)), Discretization("auto", n, 6), sure=False)[0] for n in (8, 64)]
-    assert abs(np.array(loads) / expected - 1) == pytest.approx([0, 0], abs=0.1) and abs(loads[1] / expected - 1) < 1e-3
-
-
-@pytest.mark.ranks
 def test_curvature_load_and_mass() -> None:
     def helix(s: Any, sin: Any, cos: Any) -> tuple[Any, ...]:
         return (2 * cos(3 * s), 6 + sin(5 * s), 1 + 0 * s)
