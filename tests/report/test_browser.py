@@ -4,13 +4,11 @@ It needs Debian's ``chromium`` and ``chromium-driver``, and ``pip install "rodfe
 skipped, unless ``RODFEM_BROWSER=required`` says, as in ``.ci/run``, that it must run.
 """
 
-import io
 import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -19,10 +17,8 @@ from xml.etree import ElementTree
 import demo_cases
 import numpy as np
 import pytest
-from output.test_formats import MESH, RUNS
-from PIL import Image
+from output.test_formats import MESH, made
 from problem.test_docs import scenes
-from scipy.ndimage import uniform_filter
 
 from rodfem import Parameter, Plan, run
 from rodfem.forms.energy import bending_and_twist
@@ -48,21 +44,14 @@ SIZES = [(1280, 720), (1920, 1080)]
 PROJECTOR = (1024, 768)
 PATIENCE = 90.0
 """Seconds that a page may take on a busy machine."""
-GOLDEN = Path(__file__).with_name("golden.png")
-"""The page of a run as it should look, reduced."""
-BLOCK, FORGIVEN, MOST = 8, 16.0, 12
-"""Pixels of a block, grey levels by which it may differ, and how many may differ by more."""
 
 IN_PLANE = """const plot = document.getElementById("loci"), { xaxis, yaxis } = plot._fullLayout;
     const box = plot.getBoundingClientRect();
     return [box.x + xaxis._offset + xaxis.l2p(arguments[0]), box.y + yaxis._offset + yaxis.l2p(arguments[1])]"""
 """Where the plane of loci has a point."""
 
-pytestmark = [
-    pytest.mark.skipif(
-        not (REQUIRED or (CHROMIUM and DRIVER)), reason="needs apt-get install chromium chromium-driver"
-    ),
-]
+HAVE = REQUIRED or (CHROMIUM and DRIVER)
+pytestmark = pytest.mark.skipif(not HAVE, reason="needs apt-get install chromium chromium-driver")
 
 
 @pytest.fixture(scope="module")
@@ -80,40 +69,25 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("browser")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rodfem.diagram.sweep.LOADS", 26)
-        computed(folder)
-    return folder
-
-
-def computed(folder: Path) -> None:
-    """Run what the pages show."""
-    for name in ("locus", "follower"):
-        scene, mesh, plan = RUNS[name]
-        run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
-    plan = Plan((0.0, 12.0), at=(11.0,), depth=1, spectrum=2, modes=2)
-    run(scenes()["euler"], MESH, plan, folder / "pinned", figures=False, quiet=True)
+    """What the pages show."""
+    folder = made(tmp_path_factory.mktemp("browser"), "locus", "follower", "pinned")
     stiff = {"energy": lambda v, k, c: bending_and_twist(k, (c.EI, c.EI, 1.0)), "planar": "e1"}
     column = replace(scenes()["euler"], parameters={"P": Parameter(0.0), "EI": Parameter(1.0)}, **stiff)
     run(column, MESH, Plan(depth=0, sensitivity=True), folder / "column", figures=False, quiet=True)
     beck = demo_cases.scene("follower", span=(19.0, 21.0))
-    run(beck, MESH, Plan(error_bars=False, locus=("J1", 0.0, 0.004)), folder / "beck", figures=False, quiet=True)
-
-
-@cache
-def as_it_is(folder: Path) -> str:
-    """The page of a run."""
-    return page_of(payload_of(folder))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rodfem.diagram.sweep.LOADS", 26)
+        run(beck, MESH, Plan(error_bars=False, locus=("J1", 0.0, 0.004)), folder / "beck", figures=False, quiet=True)
+    return folder
 
 
 @pytest.fixture
 def opened(browser: Any, results: Path, tmp_path: Path) -> Iterator[Callable[..., Any]]:
     """Opens the page of a run; at the end the console is empty."""
 
-    def open_page(name: str, size: tuple[int, int] = SIZES[0], change: Callable[[dict[str, Any]], Any] = dict) -> Any:
+    def open_page(name: str, size: tuple[int, int] = SIZES[0]) -> Any:
         path = tmp_path / "report.html"
-        path.write_text(as_it_is(results / name) if change is dict else page_of(change(payload_of(results / name))))
+        path.write_text(page_of(payload_of(results / name)))
         metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         browser.get(path.as_uri())
@@ -129,6 +103,36 @@ def until(browser: Any, condition: Callable[[], Any]) -> None:
     WebDriverWait(browser, PATIENCE, poll_frequency=0.05).until(lambda _: condition())
 
 
+def data(page: Any, path: str) -> Any:
+    """An entry of the data that the page has."""
+    return page.execute_script(f"return import('report/data').then(({{ data }}) => data.{path})")
+
+
+def select(page: Any, branch: int, row: int) -> None:
+    """Show a row of a branch, the first of which is straight."""
+    page.execute_script(f"import('report/store').then((store) => store.select({branch}, {row}))")
+    until(page, lambda: shown(page) == (data(page, f"branches[{branch}].name"), row))
+
+
+def row_of(page: Any, kind: str, branch: int = 0) -> int:
+    """Row of the first special point of a kind."""
+    return next(int(x["row"]) for x in data(page, f"branches[{branch}].special") if x["kind"] == kind)
+
+
+def text(page: Any, part: str) -> str:
+    return str(page.find_element(By.ID, part).text)
+
+
+def all_of(page: Any, selector: str) -> list[Any]:
+    return list(page.find_elements(By.CSS_SELECTOR, selector))
+
+
+def curves(page: Any, axis: str = "y") -> np.ndarray:
+    """The curves of the profile, (number, places)."""
+    script = f"return document.getElementById('profile').data.map((trace) => Array.from(trace.{axis}))"
+    return np.array(page.execute_script(script))
+
+
 def shown(browser: Any) -> tuple[str, int]:
     data = browser.execute_script("return {...document.body.dataset}")
     return data["branch"], int(data["row"])
@@ -138,6 +142,11 @@ def picture(browser: Any) -> str:
     """The rod as it is drawn."""
     script = "const done = arguments[0]; import('report/rod').then((rod) => done(rod.picture(1).toDataURL()))"
     return str(browser.execute_async_script(script))
+
+
+def vector(page: Any) -> str:
+    """The rod as SVG."""
+    return str(page.execute_async_script("import('report/rod').then((rod) => arguments[0](rod.vector()))"))
 
 
 def press(browser: Any, key: str) -> None:
@@ -160,25 +169,17 @@ def click(browser: Any, x: float, y: float) -> None:
         browser.execute_cdp_cmd("Input.dispatchMouseEvent", given)
 
 
-@pytest.mark.parametrize(
-    ("name", "size"),
-    [
-        ("pinned", PROJECTOR),
-        ("locus", SIZES[0]),
-        ("follower", SIZES[1]),
-    ],
-)
+@pytest.mark.parametrize(("name", "size"), [("pinned", PROJECTOR), ("locus", SIZES[0]), ("follower", SIZES[1])])
 def test_all_parts_fit_into_the_window(opened: Callable[..., Any], name: str, size: tuple[int, int]) -> None:
     page = opened(name, size)
     script = "return [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
     assert page.execute_script(script) == list(size)
-    for card in page.find_elements(By.CSS_SELECTOR, ".card"):
-        box = card.rect
+    for box in (card.rect for card in all_of(page, ".card")):
         assert box["x"] >= 0 and box["x"] + box["width"] <= size[0] and box["y"] + box["height"] <= size[1]
         assert box["width"] > 300 and box["height"] > 150
     wide = "return [...document.querySelectorAll('.bar')].filter((bar) => bar.scrollWidth > bar.clientWidth).length"
     assert page.execute_script(wide) == 0
-    assert page.find_element(By.ID, "badge").text.startswith(("STABLE", "UNSTABLE"))
+    assert text(page, "badge").startswith(("STABLE", "UNSTABLE"))
 
 
 @pytest.mark.parametrize("wide", [1400, 800, 390])
@@ -186,26 +187,7 @@ def test_no_page_is_wider_than_its_window(opened: Callable[..., Any], wide: int)
     """A narrow one has its cards one below the other."""
     page = opened("locus", (wide, 844))
     assert page.execute_script("return document.documentElement.scrollWidth") <= wide
-    cards = [card.rect for card in page.find_elements(By.CSS_SELECTOR, ".card")]
-    assert all(card["width"] > 300 and card["height"] > 150 for card in cards)
-
-
-def test_a_row_that_is_not_drawn_has_the_nearest_shape(
-    opened: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("rodfem.report.rods.BUDGET", 49 * 6)
-    page = opened("pinned", change=lambda payload: payload)
-    number = "return import('report/data').then(({ data }) => data.branches[1].%s)"
-    drawn, bodies = (page.execute_script(number % name) for name in ("drawn", "bodies.length"))
-    assert len(set(drawn)) < len(drawn) == bodies
-    row = next(row for row in range(1, len(drawn)) if drawn[row] == drawn[row - 1])
-    found = []
-    for at in (row - 1, row):
-        page.execute_script(f"import('report/store').then((store) => store.select(1, {at}))")
-        until(page, lambda at=at: shown(page) == ("branch 1", at))
-        curves = "return document.getElementById('profile').data.map((trace) => Array.from(trace.y))"
-        found.append((page.find_element(By.ID, "state-load").text, page.execute_script(curves)))
-    assert found[0][0] != found[1][0] and found[0][1] == found[1][1]
+    assert all(card.rect["width"] > 300 and card.rect["height"] > 150 for card in all_of(page, ".card"))
 
 
 def test_an_address_leads_to_what_it_names(opened: Callable[..., Any]) -> None:
@@ -221,10 +203,10 @@ def test_a_hidden_branch_is_nowhere(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
     drawn = "return document.getElementById('diagram').data.filter((t) => t.customdata?.some((c) => c[0] === 1)).length"
     assert page.execute_script(drawn)
-    swatch = page.find_elements(By.CSS_SELECTOR, "#legend .swatch")[1]
+    swatch = all_of(page, "#legend .swatch")[1]
     swatch.click()
     until(page, lambda: not page.execute_script(drawn) and shown(page)[0] != "branch 1")
-    for _ in range(page.execute_script("return import('report/data').then(({ data }) => data.branches.length)")):
+    for _ in data(page, "branches"):
         press(page, Keys.ARROW_DOWN)
         assert shown(page)[0] != "branch 1"
     swatch.click()
@@ -235,8 +217,7 @@ def test_a_click_on_a_branch_changes_the_shape(opened: Callable[..., Any]) -> No
     page = opened("pinned")
     click_at(page, 0, 2)
     until(page, lambda: shown(page) == ("straight", 2))
-    straight = picture(page)
-    row = page.execute_script("return import('report/data').then(({ data }) => data.branches[1].load.length)") // 2
+    straight, row = picture(page), data(page, "branches[1].load.length") // 2
     click_at(page, 1, row)
     until(page, lambda: shown(page)[0] == "branch 1")
     assert abs(shown(page)[1] - row) <= 1 and picture(page) != straight
@@ -250,7 +231,7 @@ def test_labels_cover_neither_marks_nor_each_other(opened: Callable[..., Any], n
         return [[...document.querySelectorAll("#diagram .annotation-text-g")].map(box), marks]"""
     labels, marks = (np.array(boxes) for boxes in page.execute_script(script))
     centres = (marks[:, :2] + marks[:, 2:]) / 2
-    assert len(labels) > len(page.execute_script("return import('report/data').then(({ data }) => data.branches)"))
+    assert len(labels) > len(data(page, "branches"))
     assert not ((centres > labels[:, None, :2]) & (centres < labels[:, None, 2:])).all(axis=2).any()
     apart = (labels[:, None, :2] >= labels[:, 2:]).any(axis=2) | (labels[:, None, 2:] <= labels[:, :2]).any(axis=2)
     assert (apart | np.eye(len(labels), dtype=bool)).all()
@@ -258,42 +239,40 @@ def test_labels_cover_neither_marks_nor_each_other(opened: Callable[..., Any], n
 
 def test_the_slider_shows_all_states_of_a_load(opened: Callable[..., Any]) -> None:
     page = opened("pinned")
-    slide = """const slider = document.getElementById("load"); slider.value = arguments[0];
-        slider.dispatchEvent(new Event("input"))"""
+
+    def slide(place: int) -> None:
+        page.execute_script(
+            f"""const slider = document.getElementById("load"); slider.value = {place};
+            slider.dispatchEvent(new Event("input"))"""
+        )
 
     def cards() -> list[str]:
         script = "return [...document.querySelectorAll('#states button')].map((x) => x.innerText)"
         return list(page.execute_script(script))
 
-    page.execute_script(slide, 500)
+    slide(500)
     until(page, lambda: len(cards()) == 1)
     assert "index 0" in cards()[0] and "straight" in cards()[0]
-    page.execute_script(slide, 920)
+    slide(920)
     until(page, lambda: len(cards()) > 1)
-    assert any("index 1" in text for text in cards())
-    numbers = [page.find_element(By.ID, name).text for name in ("load-value", "state-load")]
-    slider, state = (float(re.findall(r"[\d.]+(?:e-?\d+)?", text)[0]) for text in numbers)
-    assert slider == pytest.approx(state, rel=1e-4)  # one load on the screen
+    assert any("index 1" in card for card in cards())
+    numbers = [re.findall(r"[\d.]+(?:e-?\d+)?", text(page, name))[0] for name in ("load-value", "state-load")]
+    assert float(numbers[0]) == pytest.approx(float(numbers[1]), rel=1e-4)  # one load on the screen
 
 
 def test_modes_move(opened: Callable[..., Any]) -> None:
     """Where a state has none, those of the nearest on either side are offered, in the order of their loads."""
     page = opened("pinned")
-    rows = sorted(
-        map(int, page.execute_script("return import('report/data').then(({ data }) => data.branches[0].modes)"))
-    )
+    rows, loads = sorted(map(int, data(page, "branches[0].modes"))), data(page, "branches[0].load")
     gap = next(a for a, b in pairwise(rows) if b > a + 1)
-    page.execute_script(
-        "import('report/store').then((store) => store.select(0, arguments[0]))".replace("arguments[0]", str(gap + 1))
-    )
-    until(page, lambda: shown(page) == ("straight", gap + 1) and "modes at" in page.find_element(By.ID, "modes").text)
-    offered = [float(text.split(" = ")[1]) for text in page.find_element(By.ID, "modes").text.split("modes at")[1:]]
-    loads = page.execute_script("return import('report/data').then(({ data }) => data.branches[0].load)")
+    select(page, 0, gap + 1)
+    until(page, lambda: "modes at" in text(page, "modes"))
+    offered = [float(words.split(" = ")[1]) for words in text(page, "modes").split("modes at")[1:]]
     assert offered == sorted(offered) and len(offered) == 2
     assert offered == pytest.approx([loads[row] for row in (gap, rows[rows.index(gap) + 1])], rel=1e-4)
-    page.find_element(By.CSS_SELECTOR, "#modes button").click()
-    until(page, lambda: shown(page)[1] == gap and "swings" in page.find_element(By.ID, "modes").text)
-    page.find_element(By.CSS_SELECTOR, "#modes button").click()
+    all_of(page, "#modes button")[0].click()
+    until(page, lambda: shown(page)[1] == gap and "swings" in text(page, "modes"))
+    all_of(page, "#modes button")[0].click()
     first = picture(page)
     until(page, lambda: picture(page) != first)
     pressed = (
@@ -303,82 +282,69 @@ def test_modes_move(opened: Callable[..., Any]) -> None:
         press(page, key)
         until(page, lambda number=number: page.execute_script(f"return {pressed}") == number)
     press(page, Keys.END)
-    until(page, lambda: shown(page)[1] == len(loads) - 1 and "grows" in page.find_element(By.ID, "modes").text)
+    until(page, lambda: shown(page)[1] == len(loads) - 1 and "grows" in text(page, "modes"))
 
 
 def test_the_locus_of_a_flutter_load_leads_to_the_mode_that_flutters(opened: Callable[..., Any]) -> None:
     """Beck's column: omega = 11.02 at P = 20.05.  A click on the curve shows that state, and its mode moves."""
     page = opened("beck")
-    page.find_elements(By.CSS_SELECTOR, "#diagram-tabs button")[1].click()
-    until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#loci .scatterlayer .trace"))
-    (locus,) = page.execute_script("return import('report/data').then(({ data }) => data.loci)")
+    all_of(page, "#diagram-tabs button")[1].click()
+    until(page, lambda: all_of(page, "#loci .scatterlayer .trace"))
+    (locus,) = data(page, "loci")
     ((_, row),) = locus["special"]
     click(page, *page.execute_script(IN_PLANE, locus["x"][len(locus["x"]) // 4], locus["load"][len(locus["x"]) // 4]))
-    until(page, lambda: shown(page)[1] == row and "flutter" in page.find_element(By.ID, "sentence").text.lower())
-    load = float(re.findall(r"[\d.]+", page.find_element(By.ID, "state-load").text)[0])
-    assert load == pytest.approx(20.05, abs=5e-3)
-    buttons = page.find_elements(By.CSS_SELECTOR, "#modes button")
+    until(page, lambda: shown(page)[1] == row and "flutter" in text(page, "sentence").lower())
+    assert float(re.findall(r"[\d.]+", text(page, "state-load"))[0]) == pytest.approx(20.05, abs=5e-3)
+    buttons = all_of(page, "#modes button")
     values = [float(re.findall(r"[\d.]+", button.text)[0]) for button in buttons]
-    assert min(values) ** 0.5 == pytest.approx(11.02, abs=5e-3) and len({round(value, 1) for value in values}) == len(
-        values
-    )
+    assert min(values) ** 0.5 == pytest.approx(11.02, abs=5e-3)
+    assert len({round(value, 1) for value in values}) == len(values)
     still = picture(page)
     buttons[values.index(min(values))].click()
-    until(page, lambda: page.find_element(By.CSS_SELECTOR, "#modes [aria-pressed=true]").text.startswith("●"))
+    until(page, lambda: any(x.text.startswith("●") for x in all_of(page, "#modes [aria-pressed=true]")))
     moving = {picture(page) for _ in range(4)}
-    assert still not in moving
-    assert len(moving) > 1
+    assert still not in moving and len(moving) > 1
 
 
 def test_each_number_has_its_error_or_says_that_it_has_none(opened: Callable[..., Any]) -> None:
     """Of Euler's column between hinges, which buckles at pi^2; rows without a special point have no estimates."""
     page = opened("pinned")
 
-    def read(branch: str, row: int, *parts: str) -> list[str]:
-        number = ["straight", "branch 1"].index(branch)
-        page.execute_script(f"import('report/store').then((store) => store.select({number}, {row}))")
-        until(page, lambda: shown(page) == (branch, row))
-        return [page.find_element(By.ID, part).text for part in parts]
+    def read(branch: int, row: int) -> list[str]:
+        select(page, branch, row)
+        return [text(page, part) for part in ("state-load", "numbers", "values", "modes")]
 
-    def row_of(kind: str, branch: int) -> int:
-        script = "return import('report/data').then(({ data }) => data.branches[arguments[0]].special)"
-        return int(next(x["row"] for x in page.execute_script(script, branch) if x["kind"] == kind))
-
-    load, numbers = read("straight", row_of("branch point", 0), "state-load", "numbers")
+    load, numbers, *_ = read(0, row_of(page, "branch point"))
     value, bound = map(float, load.removeprefix("P = ").removesuffix(")").split(" ("))
     assert abs(value - np.pi**2) <= bound < 1e-9 and numbers.endswith("energy = 0.000000000000 (1e-12)")
-    load, numbers, values, modes = read("branch 1", row_of("user", 1), "state-load", "numbers", "values", "modes")
+    load, numbers, values, modes = read(1, row_of(page, "user", 1))
     numbered = r"middle = 0\.2679\d+ \(\de-\d+\); energy = 2\.111695\d+ \(\de-\d+\)"
     assert load == "P = 11 (given)" and re.search(numbered, numbers)
     assert values == "" and len(re.findall(r"\d\.\d+ \(\de-\d+\) swings", modes)) == 2 and "0 (exact)" in modes
-    load, numbers, values = read("branch 1", 4, "state-load", "numbers", "values")
+    load, numbers, values, _ = read(1, 4)
     assert load.startswith("P = ~") and numbers.count("~") == numbers.count(" = ") == 2 == values.count("~")
-    assert "~: error not estimated" in page.find_element(By.ID, "errors").text
+    assert "~: error not estimated" in text(page, "errors")
 
 
 def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., Any]) -> None:
     """Of a pinned column under the load P: the force has the size P, and the moment vanishes at the ends."""
     page = opened("pinned")
-    page.execute_script("import('report/store').then((store) => store.select(1, 6))")
-    until(page, lambda: shown(page) == ("branch 1", 6))
-    load = page.execute_script("return import('report/data').then(({ data }) => data.branches[1].load[6])")
-    found = {}
-    for tab in page.find_elements(By.CSS_SELECTOR, "#profile-tabs button"):
+    select(page, 1, 6)
+    load, found = data(page, "branches[1].load[6]"), {}
+    for tab in all_of(page, "#profile-tabs button"):
         tab.click()
-        script = "return document.getElementById('profile').data.map((trace) => Array.from(trace.y))"
-        found[tab.text] = np.array(page.execute_script(script)), page.find_element(By.ID, "profile-legend").text
+        found[tab.text] = curves(page), text(page, "profile-legend")
     assert list(found) == ["curvature", "strain", "moment", "force"]
     assert "tension" in found["force"][1] and "torque" in found["moment"][1] and "twist" in found["curvature"][1]
     assert np.allclose(np.linalg.norm(found["force"][0], axis=0), load, rtol=1e-5) and (found["force"][0][2] < 0).any()
-    page.find_element(By.CSS_SELECTOR, "#profile-space input").click()  # the force, chosen last
-    along = np.array(page.execute_script("return document.getElementById('profile').data.map((t) => Array.from(t.y))"))
-    assert np.allclose(along, [[0.0], [0.0], [-load]], atol=1e-4 * load)
-    assert "n₃ along e₃" in page.find_element(By.ID, "profile-legend").text
+    all_of(page, "#profile-space input")[0].click()  # the force, chosen last
+    assert np.allclose(curves(page), [[0.0], [0.0], [-load]], atol=1e-4 * load)
+    assert "n₃ along e₃" in text(page, "profile-legend")
     size = np.linalg.norm(found["moment"][0], axis=0)
     assert size[[0, -1]].max() < 1e-2 * size.max() and size.argmax() in range(len(size) // 3, 2 * len(size) // 3)
     assert np.allclose(found["strain"][0][2], 1.0)
     # the elements' own polynomials, as fine as a wide screen: the elastica's |m| has no corner
-    x = np.array(page.execute_script("return Array.from(document.getElementById('profile').data[0].x)"))
+    x = curves(page, "x")[0]
     slope = np.diff(size) / np.maximum(np.diff(x), POINT)
     inside = (np.diff(x) > 0)[1:] & (np.diff(x) > 0)[:-1]
     assert len(size) > 100 and abs(np.diff(slope)[inside]).max() < 0.05 * abs(slope).max()
@@ -386,13 +352,13 @@ def test_strains_forces_and_moments_are_curves_with_names(opened: Callable[..., 
 
 def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> None:
     page = opened("locus")
-    for select in ("ordinate", "view"):
-        options = page.find_elements(By.CSS_SELECTOR, f"#{select} option")
+    for choice in ("ordinate", "view"):
+        options = all_of(page, f"#{choice} option")
         assert len(options) > 2
         for option in options:
             option.click()
-    page.find_elements(By.CSS_SELECTOR, "#diagram-tabs button")[1].click()
-    until(page, lambda: page.find_elements(By.CSS_SELECTOR, "#loci .scatterlayer .trace"))
+    all_of(page, "#diagram-tabs button")[1].click()
+    until(page, lambda: all_of(page, "#loci .scatterlayer .trace"))
     assert not page.find_element(By.ID, "diagram").is_displayed()
     for format in ("svg", "png"):
         script = """const done = arguments[1], plot = document.getElementById("diagram");
@@ -400,38 +366,29 @@ def test_loci_ordinates_views_and_exports_work(opened: Callable[..., Any]) -> No
             .then(done)"""
         url = page.execute_async_script(script, format)
         assert url.startswith(f"data:image/{format}") and len(url) > 5000
-    svg = page.execute_async_script("import('report/rod').then((rod) => arguments[0](rod.vector()))")
-    lines = ElementTree.fromstring(svg).findall("{*}path[@fill='none']")
-    assert len(lines) > 500 and [x.text for x in ElementTree.fromstring(svg).findall("{*}text")][:3] == [
-        "e₁",
-        "e₂",
-        "e₃",
-    ]
+    svg = ElementTree.fromstring(vector(page))
+    assert len(svg.findall("{*}path[@fill='none']")) > 500
+    assert [x.text for x in svg.findall("{*}text")][:3] == ["e₁", "e₂", "e₃"]
     page.find_element(By.ID, "about-button").click()
-    assert "dolfinx" in page.find_element(By.ID, "origin").text
+    assert "dolfinx" in text(page, "origin")
 
 
 def test_the_rod_shows_where_to_stiffen_it(opened: Callable[..., Any]) -> None:
     """Of a pinned column by 2 pi^2 sin^2 pi s: white at the hinges, red in the middle."""
     page = opened("column")
-    script = "return import('report/data').then(({ data }) => data.branches[0].special)"
-    row = next(int(x["row"]) for x in page.execute_script(script) if x["kind"] == "branch point")
     label, legend = (page.find_element(By.ID, f"stiffen-{part}") for part in ("label", "legend"))
-    page.execute_script(
-        "import('report/store').then((store) => store.select(0, arguments[0]))".replace("arguments[0]", str(row))
-    )
-    until(page, lambda: shown(page) == ("straight", row) and label.is_displayed())
+    select(page, 0, row_of(page, "branch point"))
+    until(page, label.is_displayed)
     plain = picture(page)
-    page.find_elements(By.CSS_SELECTOR, "#stiffen option")[1].click()
+    all_of(page, "#stiffen option")[1].click()
     until(page, lambda: legend.is_displayed() and picture(page) != plain)
     assert float(re.findall(r"to (\d+\.?\d*), most", legend.text)[0]) == pytest.approx(2 * np.pi**2, rel=0.02)
     assert float(legend.text.split("s = ")[1]) == pytest.approx(0.5, abs=1 / 16)
     script = "return import('report/stiffen').then((s) => [0, 0.25, 0.5, 1].map((t) => s.colours()(t)))"
     blue = [int(re.findall(r"\d+", colour)[2]) for colour in page.execute_script(script)]
     assert min(blue[0], blue[3]) > 240 and 100 < blue[1] < 200 and blue[2] < 50
-    svg = page.execute_async_script("import('report/rod').then((rod) => arguments[0](rod.vector()))")
-    assert len(set(re.findall(r'stroke="([^"]+)"', svg))) > 20
-    page.execute_script("import('report/store').then((store) => store.select(0, 0))")
+    assert len(set(re.findall(r'stroke="([^"]+)"', vector(page)))) > 20
+    select(page, 0, 0)
     until(page, lambda: not label.is_displayed() and not legend.is_displayed())
 
 
@@ -439,46 +396,13 @@ def test_frequencies_come_first_for_a_follower_load(opened: Callable[..., Any]) 
     """Leipholz's column (1962): two frequencies meet at q = 40.05, and the range above is shaded."""
     page = opened("follower")
     script = """const plot = document.getElementById("diagram"), star = plot.data.at(-1), { shapes } = plot.layout;
-        return [star.x[0], star.customdata[0][1], shapes.map((shape) => [shape.x0, shape.x1])]"""
-    load, row, ((low, high),) = page.execute_script(script)
+        return [star.x[0], star.customdata[0][1], shapes.map((shape) => [shape.x0, shape.x1]),
+            plot.data.filter((t) => t.mode == 'lines').map((t) => t.y[0])]"""
+    load, row, ((low, high),), first = page.execute_script(script)
     assert load == pytest.approx(40.05, abs=5e-3) and low == pytest.approx(load) and high > low
-    assert "range of flutter" in page.find_element(By.ID, "legend").text
-    first = page.execute_script(
-        "return document.getElementById('diagram').data.filter((t) => t.mode == 'lines').map((t) => t.y[0])"
-    )
+    assert "range of flutter" in text(page, "legend")
     assert min(y for y in first if y is not None) == pytest.approx(3.51602, abs=1e-3)  # of the cantilever, at P = 0
     click_at(page, 0, row)
     until(page, lambda: shown(page)[1] == row)
-    page.find_elements(By.CSS_SELECTOR, "#ordinate option")[1].click()
-    until(page, lambda: "range of flutter" not in page.find_element(By.ID, "legend").text)
-
-
-def small(png: bytes) -> np.ndarray:
-    """A screenshot as one sees it with half-closed eyes: colours of blocks of pixels, blurred (rows, columns, 3)."""
-    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float)
-    height, width = (size // BLOCK for size in pixels.shape[:2])
-    blocks = pixels[: height * BLOCK, : width * BLOCK].reshape(height, BLOCK, width, BLOCK, 3).mean(axis=(1, 3))
-    return np.asarray(uniform_filter(blocks, (3, 3, 0), mode="nearest"))
-
-
-def differing(one: np.ndarray, other: np.ndarray) -> int:
-    """Number of blocks whose colours differ by more than a glance forgives."""
-    return int(np.count_nonzero(abs(one - other).max(axis=2) > FORGIVEN))
-
-
-def test_the_page_looks_as_it_did(opened: Callable[..., Any]) -> None:
-    """``RODFEM_GOLDEN=write`` in the environment takes the page as it is now for the one to compare with."""
-    page = opened("pinned")
-    page.execute_script("import('report/store').then((store) => store.select(1, 6))")
-    until(page, lambda: shown(page) == ("branch 1", 6) and page.find_elements(By.CSS_SELECTOR, "#states canvas"))
-    until(page, lambda: page.execute_script("return document.querySelectorAll('#profile .trace').length") == 3)
-    page.execute_async_script("setTimeout(arguments[0], 400)")
-    seen = small(page.get_screenshot_as_png())
-    if os.environ.get("RODFEM_GOLDEN") == "write":
-        Image.fromarray(seen.round().astype("u1")).save(GOLDEN)
-    golden = np.asarray(Image.open(GOLDEN), dtype=float)
-    assert differing(seen, golden) <= MOST
-    for part in ("rod", "overlay", "diagram", "spectrum", "profile", "legend", "states"):
-        page.execute_script("document.getElementById(arguments[0]).style.visibility = 'hidden'", part)
-        assert differing(small(page.get_screenshot_as_png()), seen) > 2 * MOST, part
-        page.execute_script("document.getElementById(arguments[0]).style.visibility = ''", part)
+    all_of(page, "#ordinate option")[1].click()
+    until(page, lambda: "range of flutter" not in text(page, "legend"))

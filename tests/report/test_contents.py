@@ -61,12 +61,6 @@ def test_a_branch_begins_at_a_branch_point() -> None:
     assert [w.verdict for w in others] == ["stable"]
 
 
-def test_words_of_a_planar_rod_say_both_indices() -> None:
-    words = words_of(branch([0, 0, 1], negative_in_space=[0, 1, None]))
-    assert [w.verdict for w in words] == ["stable", "planar", "unstable"]
-    assert [w.index for w in words] == ["0 (0)", "0 (1)", "1"] and "unstable in space" in words[1].sentence
-
-
 def test_words_of_frequencies() -> None:
     omega2 = [[[1.0, 0.0], [4.0, 0.0]], [[2.0, 1.0], [2.0, -1.0]], [[-1.0, 0.0], [2.0, 0.0]]]
     words = words_of(branch([0, 2, 1], omega2=omega2))
@@ -183,14 +177,13 @@ def test_packed_arrays_and_texts() -> None:
     assert json.loads(text) == hostile and not set(text) & set("<>&\u2028")
 
 
-def test_undecided_stability_is_not_called_stable() -> None:
-    words = words_of(branch([0, 0, 1], undecided=[0, 1, 1]))
-    assert [w.verdict for w in words] == ["stable", "undecided", "unstable"]
-    assert [w.index for w in words] == ["0", "0 or 1", "1 or 2"]
-    assert all("eigenvalue whose sign is not known on this mesh" in w.sentence for w in words[1:])
-    kink = branch([0, 1], undecided=[0, 1])
-    kink["columns"]["kink"] = ["", "spring"]
-    assert "1 negative eigenvalue on one side, and 1 eigenvalue whose sign" in words_of(kink)[1].sentence
+def test_words_warn() -> None:
+    doubtful = branch([0, 1, 1], special(2, "fold", 1, 0, resolved=False)) | {"unexplained": [{"row": 0}]}
+    words = words_of(doubtful | {"singular_start": 1})
+    assert words[0].sentence.count("Warning") == 2 and "without a special point" in words[1].sentence
+    assert "does not resolve" in words[2].sentence
+    given = words_of(branch([0, 0], special(1, "user", 0, 0, multiplicity=0)))
+    assert given[1].verdict == "stable"
 
 
 def test_readings_are_those_of_the_file() -> None:
@@ -202,10 +195,11 @@ def test_readings_are_those_of_the_file() -> None:
     assert second == {"load": "1.000000 (1e-06)"} and third == {} and fourth == {"load": "3 (given)"}
 
 
-def test_words_warn() -> None:
-    doubtful = branch([0, 1, 1], special(2, "fold", 1, 0, resolved=False)) | {"unexplained": [{"row": 0}]}
-    words = words_of(doubtful | {"singular_start": 1})
-    assert words[0].sentence.count("Warning") == 2 and "without a special point" in words[1].sentence
-    assert "does not resolve" in words[2].sentence
-    given = words_of(branch([0, 0], special(1, "user", 0, 0, multiplicity=0)))
-    assert given[1].verdict == "stable"
+def test_undecided_stability_is_not_called_stable() -> None:
+    words = words_of(branch([0, 0, 1], undecided=[0, 1, 1]))
+    assert [w.verdict for w in words] == ["stable", "undecided", "unstable"]
+    assert [w.index for w in words] == ["0", "0 or 1", "1 or 2"]
+    assert all("eigenvalue whose sign is not known on this mesh" in w.sentence for w in words[1:])
+    kink = branch([0, 1], undecided=[0, 1])
+    kink["columns"]["kink"] = ["", "spring"]
+    assert "1 negative eigenvalue on one side, and 1 eigenvalue whose sign" in words_of(kink)[1].sentence

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from output.test_formats import MESH, RUNS
+from output.test_formats import MESH, made
 from problem.test_docs import scenes
 
 from rodfem import InputError, Plan, run
 from rodfem.app import console
 from rodfem.report.page import STATIC, page_of, payload_of
 
+KINDS = ("pinned", "locus", "planar", "follower", "ring", "foundation", "guided", "accurate")
 HOSTILE = "</script><img src=x onerror=alert(1)>{{payload}}"
 
 
@@ -37,25 +38,14 @@ class Elements(HTMLParser):
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folders of small runs of different kinds."""
-    folder = tmp_path_factory.mktemp("report")
-    for name in ("pinned", "locus", "planar", "follower", "ring", "foundation", "guided", "accurate"):
-        scene, mesh, plan = RUNS[name]
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("rodfem.diagram.sweep.LOADS", 26)
-            run(scene(), mesh, plan, folder / name, figures=False, quiet=True)
-    run(
-        scenes()["euler"],
-        MESH,
-        Plan((0.0, 1.0), depth=0, error_bars=False),
-        folder / "short",
-        figures=False,
-        quiet=True,
-    )
+    folder = made(tmp_path_factory.mktemp("report"), *KINDS)
+    plan = Plan((0.0, 1.0), depth=0, error_bars=False)
+    run(scenes()["euler"], MESH, plan, folder / "short", figures=False, quiet=True)
     return folder
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["pinned", "locus", "planar", "follower", "ring", "foundation", "guided", "accurate"])
+@pytest.mark.parametrize("name", KINDS)
 def test_every_kind_of_run_has_a_page(results: Path, name: str) -> None:
     payload = payload_of(results / name)
     text = page_of(payload)
@@ -68,12 +58,11 @@ def test_every_kind_of_run_has_a_page(results: Path, name: str) -> None:
         assert shown["maps"]["shape"][0] == sum(map(len, shown["bodies"]))
         assert shown["pieces"][0]["rows"][0] == 0 and shown["pieces"][-1]["rows"][1] == rows - 1
         assert all(len(column) == rows for column in shown["ordinates"].values())
-    assert bool(data["loci"]) == (name == "locus")
-    for shown, branch in zip(data["branches"], saved["branches"], strict=True):
         rows = {0, len(branch["columns"]["load"]) - 1} | {special["row"] for special in branch["special"]}
         assert rows <= {int(row) for row in shown["modes"]} and not shown["missed"]
         for modes in shown["modes"].values():
             assert all(values["shape"] == [data["s"]["shape"][0], 6] for mode in modes for values in mode["parts"])
+    assert bool(data["loci"]) == (name == "locus")
     exact = [mode["words"] for branch in data["branches"] for modes in branch["modes"].values() for mode in modes]
     assert any(re.search(r"\(\de-", words) for words in exact) == (name == "pinned")
     assert dict(data["origin"])["command"] and "dolfinx" in dict(data["origin"])["versions"]
@@ -108,12 +97,8 @@ def test_of_too_many_states_the_nearest_is_drawn(results: Path, monkeypatch: pyt
 def test_the_page_needs_no_network_and_runs_no_text(results: Path) -> None:
     clean = payload_of(results / "short")
     plain = Elements(page_of(clean))
-    hostile: dict[str, Any] = clean | {
-        "title": HOSTILE,
-        "scene": HOSTILE,
-        "folder": HOSTILE,
-        "constants": {HOSTILE: 1.0},
-    }
+    hostile: dict[str, Any] = clean | dict.fromkeys(("title", "scene", "folder"), HOSTILE)
+    hostile["constants"] = {HOSTILE: 1.0}
     hostile["branches"] = [branch | {"name": HOSTILE, "ended": HOSTILE} for branch in clean["branches"]]
     text = page_of(hostile)
     found = Elements(text)
