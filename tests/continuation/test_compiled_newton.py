@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from golden_cases import cases, single_branches
 
-from rodfem import Discretization, InputError, Plan, Solver, trace
+from rodfem import Discretization, Plan, Solver, trace
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.fem.fields import PETSC
 from rodfem.fem.newton import OnPlane
@@ -35,11 +35,6 @@ def test_every_row_of_every_scene(name: str) -> None:
             assert np.median(off) < SAME, (branch.name, key)
 
 
-def test_unknown_factors_are_refused() -> None:
-    with pytest.raises(InputError, match="chain or petsc"):
-        Discretization(factors="superglue")
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("fresh", [True, False])
 @pytest.mark.parametrize("name", ["demo ruler", "demo hemitropic", "classic foundation"])
@@ -59,6 +54,5 @@ def test_an_iteration_is_that_of_petsc(name: str, fresh: bool) -> None:
         iteration.compiled = compiled
         made.append(iteration(fresh))
         moved.append(y)
-    assert made[0] is not None
     assert made[0] == pytest.approx(made[1], rel=1e-9)
     assert system.distance(*moved) < 1e-9 * made[0].distance

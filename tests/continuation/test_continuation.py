@@ -74,27 +74,6 @@ def test_special_points_do_not_depend_on_the_steps() -> None:
     assert max(len(b.points) for b in coarse) < 20
 
 
-@pytest.mark.ranks
-@pytest.mark.versions
-def test_newton_converges_quadratically() -> None:
-    """The size of a correction is the square of the one before: the Jacobian is the derivative of the equations."""
-    f = follower()
-    y = user_points(explored(at=AT)[1], 0.5)[0].x.copy()
-    f.system.set_phase(y)
-    f.system.set_load(y, 0.52)
-    residual, step = f.system.new_vector(), f.system.new_vector()
-    sizes = []
-    for _ in range(4):
-        state = f.system.at(y)
-        state.residual(residual)
-        state.factor(f.axis)
-        assert f.system.solve(residual, step)
-        y.axpy(-1.0, step)
-        sizes.append(f.system.norm(step))
-    assert sizes[-1] < 1e-9
-    assert np.log(sizes[3] / sizes[2]) / np.log(sizes[2] / sizes[1]) == pytest.approx(2, abs=0.2)
-
-
 def write_states(branch: Branch, solver: BranchSolver, path: Path) -> None:
     image = states_of([branch], [solver], path, first=True)
     on_first(solver.system.comm, lambda: write_whole({path: image}))

@@ -8,7 +8,6 @@ import ufl
 from classics import column
 
 from rodfem import Discretization, Inertia, Plan, Scene, SceneError, Solver, StepControl, clamped, free, trace
-from rodfem.continuation.arc import lost_between
 from rodfem.forms.energy import bending_and_twist
 from rodfem.problem.functions import Constants
 
@@ -66,23 +65,6 @@ def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
     (branch,) = trace(rod(narrow(lambda c: 1.0 - c.P, width)), MESH, plan)
     assert branch.ended == f"the stored energy is not convex any more at P = {1 - width:.6g}"
     assert branch.points[-1].load < 1 - width < 1 + width < branch.points[-1].load + 0.2
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("beside", [1e-3, 1e-9])
-def test_a_row_beside_a_loss_of_convexity(beside: float) -> None:
-    """What little stiffness there is left at one end of a step is no unit for that in the step."""
-    width = 1e-4
-    solver = Solver(rod(narrow(lambda c: 1.0 - c.P, width)), MESH).equilibria
-    low, high = 1.0 - width - beside * width, 1.1
-
-    def state(t: float) -> Any:
-        x = solver.start(0.0)
-        solver.system.set_load(x, low + t * (high - low))
-        return x
-
-    lost = lost_between(solver.convexity, state, lambda t: False)
-    assert lost == pytest.approx((1.0 - width - low) / (high - low), abs=1e-9)
 
 
 @pytest.mark.ranks

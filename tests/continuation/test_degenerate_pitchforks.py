@@ -50,7 +50,6 @@ def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
     assert all("the index is 0 or 1 (torsion" in said for said in diagram.warnings)  # right beside the fold
     (special,) = diagram.special(BRANCH_POINT)
     law = special.law
-    assert law is not None
     assert (law.kind, law.side) == ("subcritical pitchfork", -1)
     assert law.coefficient == pytest.approx(3 * beside, rel=1e-5, abs=2 * law.uncertainty)
     fold = diagram.special(FOLD)[0]
@@ -71,7 +70,6 @@ def test_the_sign_of_the_coefficient_names_the_pitchfork(beside: float, kind: st
     """Also where the fold is as near to the branch point as the uncertainty of that, which a note says."""
     diagram = pitchfork(beside)
     (special,) = diagram.special(BRANCH_POINT)
-    assert special.law is not None
     assert special.law.kind == f"{kind} pitchfork"
     assert ("turns back in a fold" in special.note) == (beside < 0)
 
@@ -79,7 +77,6 @@ def test_the_sign_of_the_coefficient_names_the_pitchfork(beside: float, kind: st
 def test_a_coefficient_that_is_not_told_from_zero() -> None:
     diagram = pitchfork(0.0)
     (special,) = diagram.special(BRANCH_POINT)
-    assert special.law is not None
     assert (special.law.kind, special.law.side) == ("pitchfork", 0)
     assert abs(special.law.coefficient) <= special.law.uncertainty
     assert "undetermined form" in diagram.in_words()

@@ -11,7 +11,7 @@ from classics import ON_AXIS, column, explore, push
 from closed_form_hemitropic import loads as buckling_loads
 
 from rodfem import Discretization, Ordinate, Plan, Scene, StepControl, clamped, free, pinned, sliding, trace
-from rodfem.continuation.branch import breaks, merge_doubles
+from rodfem.continuation.branch import breaks
 from rodfem.continuation.follow import follow
 from rodfem.continuation.kinds import BRANCH_POINT
 from rodfem.output.table import branch_data
@@ -52,32 +52,6 @@ def test_bars_of_a_double_point_hold_for_both_loads() -> None:
     assert special.error_estimate < 2 * apart
 
 
-def test_an_unresolved_point_is_no_half_of_a_double_one() -> None:
-    """Two critical loads a tenth apart: the bar of the first one, set to 3, reaches the resolved other one."""
-    scene = column("two", (clamped(), free(push)), (2.0, 3.0), constants={"B2": 1.1})
-    (branch,) = trace(scene, Discretization("reduced", 4, 5), Plan(depth=0))
-    first, second = branch.special[:2]
-    first.error_estimate, first.resolved, bar = 3.0, False, second.error_estimate
-    merge_doubles(branch)
-    assert branch.special[:2] == [first, second]
-    assert (second.multiplicity, second.error_estimate) == (1, bar) and bar < 1e-6
-    assert not breaks(branch.points, branch.special)
-
-
-def test_two_passages_of_one_load_are_no_double_point() -> None:
-    """A branch comes back to the load of a branch point: in between it was elsewhere, by far more than the bars."""
-    scene = column("two", (clamped(), free(push)), (2.0, 3.0), constants={"B2": 1.1})
-    (branch,) = trace(scene, Discretization("reduced", 4, 5), Plan(depth=0))
-    first, second = branch.special[:2]
-    second.point.load = first.point.load
-    merge_doubles(branch)
-    assert branch.special[:2] == [first, second] and second.multiplicity == 1
-    for row in branch.points:
-        row.load = first.point.load
-    merge_doubles(branch)
-    assert branch.special[0] is second and second.multiplicity == 2
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize(("low", "high", "largest"), [
     (0.2950, 0.4990121, 0.1), (0.4946, 0.6990, 0.3), (0.4910, 0.5050, 0.3),  # the last row, the first, the only step
@@ -112,20 +86,6 @@ def test_what_is_not_explained_is_kept() -> None:
     assert (entry["before"], entry["after"]) == (0, 1)
 
 
-@pytest.mark.few(1)
-@pytest.mark.parametrize("short", [0.0, 1e-9, 1e-4])
-def test_branches_that_leave_at_the_end_of_the_range(short: float) -> None:
-    """All rows are within the range; a branch of which it has nothing is none."""
-    scene = column("range", (clamped(), free(push)), (0.0, EULER + short))
-    found = explore(scene, depth=1)
-    (special,) = found.special()
-    assert special.point.load == pytest.approx(EULER, abs=1e-11)
-    assert len(found.branches) == (2 if short == 1e-4 else 1)
-    for branch in found.branches:
-        assert branch.ended == "end of range"
-        assert max(p.load for p in branch.points) <= scene.span[1] * (1 + 1e-7)
-
-
 def test_a_range_that_begins_at_a_branch_point() -> None:
     """What is not looked at is said: the branch point is a row that no search has before it."""
     scene = column("range", (clamped(), free(push)), (EULER, 4.0))
@@ -158,3 +118,11 @@ def test_what_is_free_on_the_trunk_alone_leaves_the_index_of_a_branch_open() -> 
     assert {p.zero for p in diagram[0].points if p.load < 15} == {1}
     assert (branch.points[1].negative, branch.points[1].zero) == (1, 0)
     assert not any(b.unexplained for b in diagram)
+
+
+def test_a_branch_that_leaves_at_the_end_of_the_range_is_none() -> None:
+    """All rows are within the range, of which it has nothing."""
+    found = explore(column("range", (clamped(), free(push)), (0.0, EULER + 1e-9)), depth=1)
+    (special,), (branch,) = found.special(), found.branches
+    assert special.point.load == pytest.approx(EULER, abs=1e-11) and branch.ended == "end of range"
+    assert max(p.load for p in branch.points) <= EULER * (1 + 1e-7)

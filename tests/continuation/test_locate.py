@@ -6,21 +6,10 @@ from math import atan, cos, exp, log
 import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
-from numpy.polynomial.polynomial import polyfromroots
 
 from rodfem.continuation.curves import zero_between
-from rodfem.continuation.eigenvalue_curves import in_doubt, locate_flutter, real_root
+from rodfem.continuation.eigenvalue_curves import locate_flutter
 from rodfem.stability.cluster import Cluster, Measured
-
-NODES = 6
-"""Of a series."""
-
-
-def test_the_zero_nearest_to_the_middle() -> None:
-    """Of -0.7, 0.3 and 0.6; those far outside and the complex ones are none."""
-    series = chebyshev.poly2cheb(polyfromroots([-0.7, 0.3, 0.6, 3.0, 0.1 + 0.1j, 0.1 - 0.1j]).real)
-    assert real_root(series) == pytest.approx(0.3, abs=1e-12)
-    assert real_root(chebyshev.poly2cheb(np.array([1.0, 0.0, 1.0]))) is None
 
 
 @pytest.mark.parametrize("start", [0.0, 0.9])
@@ -37,24 +26,6 @@ def test_a_collision_is_not_extrapolated(start: float) -> None:
     found = locate_flutter(at, Cluster(np.zeros((1, 2)), 5.0), start, 1.0)
     assert abs(found.load - expected) <= found.uncertainty + 1e-15
     assert found.uncertainty < 1e-9
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("noise", [1e-6, 1e-3, 0.05])
-def test_noise_is_no_sharp_zero(noise: float) -> None:
-    """The last coefficient alone is less than the error in two cases of three, than a third of it in one of three."""
-    t, errors = chebyshev.chebpts1(NODES), np.random.default_rng(1).normal(size=(1000, NODES)) * noise
-    ratios = []
-    for values in (t - 0.1) * (1.0 + 0.2 * (t - 0.1)) + errors:
-        series = chebyshev.chebfit(t, values, NODES - 1)
-        root = real_root(series)
-        assert root is not None
-        slope = abs(chebyshev.chebval(root, chebyshev.chebder(series)))
-        ratios.append(abs(root - 0.1) * slope / in_doubt(series))
-    assert np.mean(np.array(ratios) > 1.0) < 0.04
-    assert np.mean(np.array(ratios) > 3.0) < 0.02
-    smooth = chebyshev.chebfit(t, np.expm1(0.05 * (t - 0.1)), NODES - 1)
-    assert in_doubt(smooth) == abs(smooth[-1])
 
 
 CASES: list[tuple[Callable[[float], float], float, float, float]] = [

@@ -1,7 +1,5 @@
 """The reduced stiffness matrix, against dense linear algebra; its crossings, against matrices whose zeros are known."""
 
-from math import acos, cos, pi, sin
-
 import numpy as np
 import pytest
 import scipy.linalg
@@ -12,7 +10,7 @@ from rows import regular
 import rodfem
 from rodfem import Discretization, Solver, pinned
 from rodfem.continuation.arc import Piece
-from rodfem.continuation.crossings import Node, Zeros, fourth, negative, roots
+from rodfem.continuation.crossings import Node, Zeros, negative
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.reduced_stiffness import Condensation
 
@@ -51,14 +49,9 @@ def test_the_rate_is_the_derivative_along_the_branch(name: str) -> None:
     solver, (a, b) = diagram.solvers[rows[4].mesh], rows[4:6]
     condensation = Condensation(solver.inertia)
     piece = Piece(solver, condensation, a, b, condensation.border(a.x))
-    assert a.tangent is not None
-    assert b.tangent is not None
     p, q = piece.node(a.x, a.tangent), piece.node(b.x, b.tangent)
     middle = piece.solve(p, q, (p.s + q.s) / 2)
-    assert middle is not None
     near = piece.solve(p, middle, middle.s - 1e-3 * q.s), piece.solve(middle, q, middle.s + 1e-3 * q.s)
-    assert near[0] is not None
-    assert near[1] is not None
     difference = (near[1].H - near[0].H) / (near[1].s - near[0].s)
     assert np.allclose(middle.slope, difference, atol=2e-5 * abs(difference).max())
 
@@ -68,18 +61,6 @@ def polynomial(*coefficients: np.ndarray) -> tuple[Node, Node]:
     A = [np.array(a, dtype=float) for a in coefficients]
     slope = sum(i * a for i, a in enumerate(A) if i)
     return Node(0.0, A[0], A[1], 2), Node(1.0, sum(A[1:], A[0]), slope, 2)
-
-
-def test_all_zeros_are_eigenvalues_of_the_pencil() -> None:
-    """Of ``Q^t diag(polynomials) Q``."""
-    rotation = scipy.linalg.expm(np.array([[0, 0.4, -0.7], [-0.4, 0, 0.3], [0.7, -0.3, 0]]))
-    diagonals = np.array([[0.25, 0.1, -0.08], [-1.0, -0.2, 1.0], [0.0, 0.0, -3.0], [0.0, 0.0, 2.0]])
-    a, b = polynomial(*(rotation.T @ np.diag(d) @ rotation for d in diagonals))
-    cubic = np.roots([2.0, -3.0, 1.0, -0.08])
-    expected = [0.25, 0.5, *cubic]
-    found = roots(a, b)
-    for t in expected:
-        assert abs(found - t).min() < 1e-9
 
 
 def test_crossings_and_their_indices() -> None:
@@ -110,39 +91,3 @@ def test_a_pair_within_a_step_asks_for_one_state_between() -> None:
         assert [(c.before, c.after) for c in found] == ([(0, 1), (1, 0)] if sign < 0 else [])
         assert len(asked) == 1
         assert len(misses) == (sign > 0)
-
-
-def test_an_eigenvalue_that_touches_zero_has_one_index() -> None:
-    """``(t - c)^2``, at which a state between may be, to round-off: none is negative on either side, nor at it."""
-    for c in np.linspace(0.2, 0.8, 61):
-
-        def node(a: Node | None, b: Node | None, s: float, c=c) -> Node:
-            return Node(s, np.array([[(s - c) ** 2]]), np.array([[2 * (s - c)]]), 0)
-
-        found = Zeros(node, 1e-12).crossings(node(None, None, 0.0), node(None, None, 1.0), np.zeros((1, 1)))
-        assert {index for x in found for index in (x.before, x.after, x.rest)} <= {0}
-
-
-def test_a_piece_that_ends_beside_a_touch_is_not_divided() -> None:
-    """``(1.02 - t)^2`` up to t = 1, and what the cubic is off at most, which is nothing at its ends."""
-    a, b = (Node(t, np.array([[(1.02 - t) ** 2]]), np.array([[2 * (t - 1.02)]]), 0) for t in (0.0, 1.0))
-    asked = list[float]()
-    assert Zeros(lambda a, b, s: asked.append(s), 1e-12).crossings(a, b, np.array([[0.05]])) == []
-    assert not asked
-
-
-@pytest.mark.parametrize("known", [True, False])
-@pytest.mark.parametrize("other", [1.0, -0.1])
-def test_a_pair_that_the_cubic_does_not_have(known: bool, other: float) -> None:
-    """``1 + 1.01 sin 6s`` is negative in a twelfth of a piece; what is left of it, the row before shows, or a state."""
-    width = acos(1 / 1.01) / 6
-    expected = sorted([pi / 4 - width, pi / 4 + width] + [0.1] * (other < 0))
-
-    def solve(a: Node | None, b: Node | None, s: float) -> Node:
-        value, slope = (1 + 1.01 * sin(6 * s), other + (other < 0) * s), (6.06 * cos(6 * s), 1.0 * (other < 0))
-        return Node(s, np.diag(value), np.diag(slope), 0)
-
-    before, a, b = (solve(None, None, s) for s in (-1.0, 0.0, 1.0))
-    found = Zeros(solve, 1e-12).crossings(a, b, fourth(a, b, before if known else None))
-    assert [c.s for c in found] == pytest.approx(expected, abs=1e-3)
-    assert abs(found[-1].after - found[0].before) == (other < 0)

@@ -108,7 +108,6 @@ def test_unfolding_is_the_work_of_the_imperfection() -> None:
         special = straight.special()[0]
         solver = Solver(cantilever(lateral), Discretization("reduced", 8, 6)).equilibria
         found = SingularSystem(solver, special.null_vectors, special.multiplicity, fold=False).solve(special.point.x)
-        assert found is not None
         assert found.load == pytest.approx(EULER, abs=1e-11)
         values.append(found)
     assert values[0].size <= values[0].noise
@@ -135,16 +134,6 @@ def test_a_branch_point_that_the_mesh_unfolds_ends_no_branch() -> None:
     assert abs(point.point.load - 1.859970217) <= 1.5 * point.error_estimate < 2e-8
 
 
-def test_perfect_points_stay_what_they_are() -> None:
-    found = diagram(cantilever(0.0))
-    (special,) = found.special()
-    assert special.kind == BRANCH_POINT
-    assert special.unfolding < 1e-14
-    assert special.point.load == pytest.approx(EULER, abs=2e-12)
-    assert special.law is not None
-    assert special.law.kind == "supercritical pitchfork"
-
-
 @pytest.mark.long
 def test_a_mesh_without_the_symmetry_of_the_rod() -> None:
     """Unequal elements take a pitchfork apart that the reversal of the rod makes: a richer mesh tells."""
@@ -167,20 +156,13 @@ def test_what_steps_do_not_resolve_is_called_imperfect() -> None:
     assert special.unfolding == pytest.approx(5e-14 * np.sqrt(2) * 2 / pi, rel=1e-2)
 
 
-@pytest.mark.few(1)
-@pytest.mark.parametrize("beside", [1e-11, 1e-6])
-def test_a_load_beside_a_branch_point(beside: float) -> None:
-    """The branch that leaves there has its row at that load, and goes on: sqrt(P) = K(k), tip 2 k / sqrt(P).
-
-    The tip grows with the root of what P exceeds the critical load by, which round-off changes by 4e-15.
-    """
+def test_a_load_beside_a_branch_point() -> None:
+    """The branch that leaves there has its row at that load, and goes on: sqrt(P) = K(k), tip 2 k / sqrt(P)."""
     scene = column("beside", SUPPORTS["clamped-free"], (0.0, 4.0), ordinate=cantilever(0.0).ordinate)
-    found = diagram(scene, at=(EULER + beside,))
-    buckled = found.branches[1]
+    buckled = diagram(scene, at=(load := EULER + 1e-11,)).branches[1]
     assert buckled.ended == "end of range"
     (row,) = [s.point for s in buckled.special if s.kind == "user"]
-    assert row.load == EULER + beside
-    assert abs(row.ordinate) == pytest.approx(elastica(row.load)[1], rel=4e-15 / beside + 1e-8)
+    assert row.load == load and abs(row.ordinate) == pytest.approx(elastica(load)[1], rel=4e-4)  # by round-off of P
 
 
 @pytest.mark.long

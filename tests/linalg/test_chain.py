@@ -1,8 +1,6 @@
 """The elimination along a chain against dense linear algebra, and against MUMPS on matrices of every scene."""
 
-import shutil
 import subprocess
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -124,40 +122,12 @@ def test_beside_special_points(name: str, formulation: str) -> None:
     assert seen >= 14
 
 
-@pytest.mark.few(1)
-@pytest.mark.parametrize(("formulation", "elements", "degree"), [("reduced", 3000, 1), ("reduced", 400, 6)])
-def test_few_pivots_are_delayed(formulation: str, elements: int, degree: int) -> None:
-    """Couplings to the contact force add up along the rod: a scale by their largest entry would delay them all."""
-    solver = Solver(small_scene("cord"), Discretization(formulation, elements, degree), MPI.COMM_SELF).equilibria
-    found = solver.inertia.at(solver.start(20.0, 0.3))
-    found.count()
-    factors = found.factors
-    assert isinstance(factors, Chain)
-    assert factors.lib.chain_fronts(factors.pointer) >= elements - 1
-    assert factors.lib.chain_delayed(factors.pointer) < elements / 4
-
-
 @pytest.mark.long
 def test_clean_under_the_sanitizers(tmp_path: Path) -> None:
-    compiler = shutil.which("gcc")
-    assert compiler is not None
-    here, program = Path(__file__).parent, tmp_path / "driver"
-    flags = [
-        "-g",
-        "-O1",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        "-Wno-unused-function",
-        "-fsanitize=address,undefined",
-        "-fno-sanitize-recover",
-    ]
-    source = Path(rodfem.linalg.__file__).parent
-    build = [compiler, *flags, f"-I{source}", str(here / "chain_driver.c"), "-o", str(program), "-lm"]
-    run: Callable[[list[str]], subprocess.CompletedProcess[str]] = lambda command: subprocess.run(  # noqa: E731
-        command, capture_output=True, text=True, check=False
-    )
-    built = run(build)
+    here, source, program = Path(__file__).parent, Path(rodfem.linalg.__file__).parent, tmp_path / "driver"
+    flags = "-g -O1 -Wall -Wextra -Werror -Wno-unused-function -fsanitize=address,undefined -fno-sanitize-recover"
+    build = ["gcc", *flags.split(), f"-I{source}", str(here / "chain_driver.c"), "-o", str(program), "-lm"]
+    built = subprocess.run(build, capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
-    done = run([str(program)])
+    done = subprocess.run([str(program)], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "0 wrong\n"), done.stdout + done.stderr

@@ -1,9 +1,7 @@
 """Compiled modules export no name, and what they keep pointers to lives as long."""
 
-import gc
 import shutil
 import subprocess
-import weakref
 from pathlib import Path
 
 import numpy as np
@@ -42,22 +40,6 @@ def test_so_do_those_of_forms(tmp_path: Path) -> None:
     damaged = tmp_path / f"damaged{made.suffix}"
     damaged.write_bytes(made.read_bytes()[:99])
     assert code_cache.load(name, damaged) is None and not damaged.exists()  # so that it is compiled anew
-
-
-def test_memory_keeps_what_a_pointer_points_to() -> None:
-    class Array(np.ndarray):
-        """One that a weak reference can watch."""
-
-    ffi = compiled.module("linalg/chain").ffi
-    memory, first = compiled.Memory(ffi), np.arange(3.0).view(Array)
-    pointer, watched = memory.array("x", first), weakref.ref(first)
-    del first
-    gc.collect()
-    assert watched() is not None and list(pointer[0:3]) == [0.0, 1.0, 2.0]
-    del pointer
-    memory.array("x", np.zeros(2, dtype=np.int32))
-    gc.collect()
-    assert watched() is None
 
 
 @pytest.mark.parametrize("values", [np.zeros(3, dtype=np.float32), np.arange(3, dtype=np.int64), np.zeros((4, 4))[::2]])

@@ -9,7 +9,7 @@ from petsc4py import PETSc
 from rodfem import Discretization, Solver
 from rodfem.fem.system import System
 from rodfem.linalg.chain import Chain
-from rodfem.linalg.factorization import Mumps, Sizes
+from rodfem.linalg.factorization import Mumps
 from rodfem.linalg.matrices import gathered
 from rodfem.stability.assessment import Assessor
 from rodfem.stability.inertia import Inertia
@@ -29,11 +29,6 @@ def at(name: str, state: str, formulation: str, load: float) -> tuple[System, PE
     system, x = getattr(small_states, state)(name, formulation, 7, 3, load)
     system.set_phase(x)
     return system, x
-
-
-def symmetric(sizes: Sizes | None = None) -> Mumps:
-    """LDL^t factors of matrices for unknowns of these natural sizes."""
-    return Mumps("cholesky", sizes)
 
 
 def whole(vector: PETSc.Vec) -> np.ndarray:
@@ -57,39 +52,12 @@ def check(factors: Mumps, matrix: PETSc.Mat, right: PETSc.Vec) -> None:
 @STATES
 def test_inertia_and_solutions(name: str, state: str, formulation: str, load: float) -> None:
     system, x = at(name, state, formulation, load)
-    inertia, factors = Inertia(system), symmetric()
+    inertia, factors = Inertia(system), Mumps("cholesky")
     right = inertia.seed(1)
     for sigma in SIGMAS:
         matrix = inertia.at(x).matrix
         matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         check(factors, matrix, right)
-
-
-@pytest.mark.versions
-def test_many_right_hand_sides() -> None:
-    system, x = at("hemitropic", "buckled", "pointwise", 0.2)
-    inertia, factors = Inertia(system), symmetric()
-    matrix = inertia.at(x).matrix
-    matrix.axpy(1.0, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    factors(matrix)
-    out = factors.solve_all(np.stack([inertia.seed(i).array_r for i in range(3)], axis=1))
-    for i in range(3):
-        one = system.new_vector()
-        factors.solve(inertia.seed(i), one)
-        np.testing.assert_allclose(out[:, i], one.array_r, rtol=1e-8, atol=1e-12)
-
-
-@pytest.mark.versions
-def test_natural_sizes() -> None:
-    """What is factored in units of the unknowns has the inertia and the solutions of the matrix."""
-    system, x = at("hemitropic", "buckled", "pointwise", 0.2)
-    inertia, sizes = Inertia(system), system.new_vector()
-    sizes.array[:] = 10.0 ** np.random.default_rng(system.comm.rank).uniform(-3, 3, sizes.local_size)
-    factors = symmetric(lambda: sizes)
-    for sigma in (-3.0, 0.1):
-        matrix = inertia.at(x).matrix
-        matrix.axpy(-sigma, inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        check(factors, matrix, inertia.seed(1))
 
 
 @pytest.mark.few(1)
