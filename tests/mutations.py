@@ -302,7 +302,7 @@ TABLE = {
         "kinks-to-one-side-are-none": (
             "(bent | (larger < 2 * change)).any()", "(larger < 2 * change).any()", "diagram/test_kinks.py"),
         "convexity-of-the-undeformed-state-alone": (
-            "self.alters = of_state or", "self.alters =", "diagram/test_functions_between_rows.py"),
+            "self.alters = of_state or", "self.alters =", "continuation/test_convexity.py"),
     },
     "rodfem/fem/equations.py": {
         "constants-of-the-first-scene-stay": (
@@ -445,7 +445,8 @@ TABLE = {
     },
     "rodfem/stability/inertia.py": {
         "quotients-of-the-wrong-sign": (
-            "(self.values < -self.uncertainty).sum()", "(self.values > self.uncertainty).sum()", INERTIA),
+            "(self.values < -self.uncertainty).sum()", "(self.values > self.uncertainty).sum()",
+            "stability/test_round_off.py"),
         "matrix-of-another-state": (
             "held is state and phase is self.system.phase and", "held is not None and", INERTIA),
         "eigenvalues-beside-the-edge-of-the-band": ("\nFAR = 0.1\n", "\nFAR = 1e9\n", "stability/test_round_off.py"),

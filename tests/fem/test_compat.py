@@ -40,53 +40,6 @@ def test_nodes_are_those_of_lobatto(degree: int) -> None:
     np.testing.assert_allclose(np.sort(compat.nodes(degree)), lobatto(degree), rtol=0, atol=1e-14)
 
 
-@DEGREES
-def test_basis_is_nodal_and_reproduces_polynomials(degree: int) -> None:
-    x = np.linspace(0, 1, 17)
-    basis = compat.lagrange_basis(degree, x)
-    np.testing.assert_allclose(compat.lagrange_basis(degree, compat.nodes(degree)), np.eye(degree + 1), atol=1e-12)
-    np.testing.assert_allclose(basis.sum(axis=1), 1, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(basis @ compat.nodes(degree) ** degree, x**degree, rtol=0, atol=1e-13)
-
-
-@pytest.mark.ranks
-@pytest.mark.short
-def test_fields_have_the_nodes_of_their_elements() -> None:
-    """A linear function of arclength, set at what ``coordinates`` says are the nodes, has the slope one everywhere."""
-    fields = follower("reduced", 8, 6).system.fields
-    a, b = fields.vertices.T
-    np.testing.assert_allclose(b - a, 6 / 8, rtol=1e-13)
-    f = fem.Function(fields.space)
-    f.x.array[fields.dofs["q"][..., 2]] = fields.coordinates(6)
-    slope = ufl.split(f)[0][2].dx(0)
-    error = fem.assemble_scalar(fem.form((slope - 1) ** 2 * ufl.dx))
-    assert COMM.allreduce(error) < 1e-20
-
-
-@pytest.mark.ranks
-def test_lobatto_quadrature_collocates() -> None:
-    """With the rule of the unit-norm constraint the mass matrix is diagonal, and holds that rule's weights."""
-    degree, elements, length = 4, 5, 3.0
-    mesh = compat.interval_mesh(COMM, elements, 0.0, length)
-    space = compat.mixed_space(mesh, [(True, degree, 1), (False, 0, 1)])
-    u, v = ufl.TrialFunctions(space)[0], ufl.TestFunctions(space)[0]
-    dx = ufl.dx(domain=mesh, metadata={"quadrature_degree": 2 * degree - 1, "quadrature_rule": "GLL"})
-    matrix = fem.petsc.assemble_matrix(fem.form(u * v * dx))
-    matrix.assemble()
-    diagonal = matrix.getDiagonal()
-    found = np.concatenate(COMM.allgather(diagonal.array_r))
-    matrix.setDiagonal(diagonal * 0.0)
-    assert matrix.norm() < 1e-15
-    ends = legendre.legval(2 * lobatto(degree) - 1, np.eye(degree + 1)[-1])
-    weights = length / elements / (degree * (degree + 1) * ends**2)
-    expected = np.zeros(elements * degree + 1)
-    for e in range(elements):
-        expected[e * degree : (e + 1) * degree + 1] += weights
-    np.testing.assert_allclose(
-        np.sort(found)[elements:], np.sort(expected), rtol=1e-12
-    )  # zeros first, of the constants
-
-
 @pytest.mark.ranks
 @pytest.mark.short
 def test_a_second_system_compiles_nothing() -> None:
@@ -223,6 +176,5 @@ def test_a_number_that_vanishes_shifts_no_other(energy: Any) -> None:
     """diag(1, -0.3, 1.5) was computed for diag(1, 1.3, 1.5)."""
     solver = Solver(rod(energy), Discretization(elements=2, degree=3)).equilibria
     convexity = solver.convexity
-    assert convexity is not None
     matrices = convexity._matrices(solver.start(0.0))  # the straight rod
     np.testing.assert_allclose(matrices, np.broadcast_to(np.diag([1.0, 1.3, 1.5]), matrices.shape), atol=1e-12)

@@ -8,7 +8,7 @@ import classics
 import numpy as np
 import pytest
 
-from rodfem import Discretization, End, Scene, SceneError, Solver
+from rodfem import Discretization, End, Scene, Solver
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.stability.assessment import Assessor
@@ -69,11 +69,3 @@ def test_greenhill_between_pins(kind: str) -> None:
     assert points[0].point.load == pytest.approx(2 * pi, rel=1e-7)  # a double eigenvalue
     assert (points[0].negative_before, points[-1].negative_after) == (0, 2)
     assert {p.zero for p in found.branches[0].points if abs(p.load - 2 * pi) > 0.01} == {1}
-
-
-@pytest.mark.long
-@KINDS
-def test_a_motion_that_a_load_drives(kind: str) -> None:
-    """A moment at one end that nothing balances turns the rod for ever."""
-    with pytest.raises(SceneError, match="nothing holds the rod against the rotation about e3"):
-        classics.sweep(scene(kind, balanced=False))

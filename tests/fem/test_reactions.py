@@ -4,7 +4,6 @@ import csv
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
@@ -17,10 +16,9 @@ from problem.test_docs import scenes
 from scipy.special import ellipe, ellipk
 
 import rodfem
-from rodfem import Attachment, Discretization, Ordinate, Plan, Scene, Solver, clamped, elastic, free, hinged, pinned
+from rodfem import Attachment, Discretization, Ordinate, Plan, Scene, clamped, elastic, free, hinged, pinned
 from rodfem.forms.energy import bending_and_twist, hemitropic
-from rodfem.output.states import Profiles, to_csv
-from rodfem.problem.quaternions import directors
+from rodfem.output.states import to_csv
 
 TIP = (0.15, 0.1, 0.9)
 FORCE = (0.4, -0.3, 0.2)
@@ -123,27 +121,6 @@ def cable() -> Scene:
     )  # fmt: skip
 
 
-def test_a_helical_spring_of_natural_curvature_and_twist() -> None:
-    """Stiffness of a helix whose ends do not turn, by Kirchhoff's equations, but for what holds them across the axis.
-
-    With the pitch angle a, ``1/k = R^2 L (c^2/C + s^2/B) - (R L s c (1/C - 1/B))^2 / (L (s^2/C + c^2/B))``.
-    """
-    R, B, C, turns = 1.0, 1.3, 1.0, 8
-    size = float(np.hypot(R, 0.3))
-    c, s, length = R / size, 0.3 / size, 2 * pi * turns * size
-    axis, height = np.array([0.0, c, s]), 2 * pi * turns * 0.3
-    spring = Scene(
-        "spring", (0.0, length), "unshearable and inextensible",
-        lambda v, k, _: bending_and_twist((k[0], k[1] - c / size, k[2] - s / size), (B, B, C)), {"x": 0.0}, "x",
-        (clamped(), clamped(lambda p: tuple((height - p.x) * float(a) for a in axis))),
-        Ordinate("middle", s=length / 2, of=lambda r, q: float(r @ axis)), (0.0, 1e-3),
-    )  # fmt: skip
-    point = rodfem.Solver(spring, Discretization(elements=32)).equilibrium(1e-3)
-    soft = R**2 * length * (c**2 / C + s**2 / B)
-    soft -= (R * length * s * c * (1 / C - 1 / B)) ** 2 / (length * (s**2 / C + c**2 / B))
-    assert -point.reactions.right.force @ axis / 1e-3 == pytest.approx(1 / soft, rel=0.01)
-
-
 def test_the_moment_at_a_clamp_of_a_boundary_layer() -> None:
     """A layer of 0.8 m in an element of 6 m; right by scipy's solve_bvp, tolerance 1e-8."""
     right, errors = -18267.15072958902, []
@@ -195,13 +172,10 @@ def test_what_follows_from_a_state_is_within_its_bar(elements: int) -> None:
 
 def test_profiles_of_a_helix() -> None:
     """A hemitropic rod that is free at one end, under a moment along its axis, is straight: by Hooke's law alone."""
-    scene = Scene(
-        "twisted", (0.0, 2.0), "flexible",
-        lambda v, k, c: (
-            hemitropic(v, k, stretching=10.0, coupling=-1.0, twisting=1.0, bending=1.0) + 50.0 * (v[0] ** 2 + v[1] ** 2)
-        ),
-        {"P": 0.0}, "P", (clamped(), free(lambda c: (0.0, 0.0, c.P))), Ordinate("end", s=2.0, of=lambda r, q: r[2]),
-        (0.0, 1.0),
+    law = {"stretching": 10.0, "coupling": -1.0, "twisting": 1.0, "bending": 1.0}
+    scene = classics.column(
+        "twisted", (clamped(), free(lambda c: (0.0, 0.0, c.P))), (0.0, 1.0), rod="flexible", interval=(0.0, 2.0),
+        energy=lambda v, k, c: hemitropic(v, k, **law) + 50.0 * (v[0] ** 2 + v[1] ** 2), ordinate=MIDDLE,
     )  # fmt: skip
     point = rodfem.Solver(scene).equilibrium(1.0)
     stretch, twist = np.linalg.solve([[10.0, -1.0], [-1.0, 1.0]], [1.0, 0.0])
@@ -217,12 +191,9 @@ def test_profiles_of_a_helix() -> None:
         point.profile([2.1])
 
 
-ELEMENTS, DEGREE, LOAD = 6, 5, 2.0
-PULL = (0.6 * LOAD, 0.8 * LOAD, -LOAD)
 BOWED = classics.column(
-    "bowed", (rodfem.clamped(), rodfem.free(lambda c: (0.6 * c.P, 0.8 * c.P, -c.P))), (0.0, 2.0),
+    "bowed", (clamped(), free(lambda c: (0.6 * c.P, 0.8 * c.P, -c.P))), (0.0, 2.0), ordinate=MIDDLE,
     energy=lambda v, k, c: bending_and_twist((k[0], k[1] - 1.0, k[2]), (1.0, 2.0, 0.7)),
-    ordinate=scenes()["heavy"].ordinate,
 )  # fmt: skip
 """Bent in one plane where no load acts, and pulled out of it at its tip: it twists."""
 SCENES = {
@@ -236,16 +207,9 @@ SCENES = {
 }
 
 
-def at_vertices(scene: Scene, formulation: str = "auto") -> dict[str, np.ndarray]:
-    """Arclength, position, contact force and moment in space, torque, at both ends of each element (E, 2, ...)."""
-    solver = Solver(scene, Discretization(formulation, ELEMENTS, DEGREE))
-    x = solver.equilibrium(LOAD).x
-    sample, found = solver.equilibria.shape.sample(x), solver.equilibria.resultants.at(x)
-    s, r, q = (np.stack([sample[key][:-1:DEGREE], sample[key][DEGREE::DEGREE]], 1) for key in ("s", "r", "q"))
-    assert np.allclose(found["points"][:, [0, -1]], s)
-    R = directors(q / np.linalg.norm(q, axis=-1, keepdims=True))
-    n, m = (np.einsum("epij,epj->epi", R, found[name][:, [0, -1]]) for name in ("force", "moment"))
-    return {"s": s, "r": r, "n": n, "m": m, "torque": found["moment"][:, [0, -1], 2]}
+def at_two(scene: Scene, formulation: str = "auto") -> rodfem.Point:
+    """The equilibrium at a load of 2."""
+    return rodfem.Solver(scene, Discretization(formulation, 6, 5)).equilibrium(2.0)
 
 
 @pytest.mark.long
@@ -254,28 +218,14 @@ def at_vertices(scene: Scene, formulation: str = "auto") -> dict[str, np.ndarray
 )
 def test_a_dead_force_is_carried_along_the_rod(name: str, formulation: str) -> None:
     """``n`` is the force at the free end, ``m`` its moment; a rod that cannot twist carries a torque all the same."""
-    found = at_vertices(SCENES[name], formulation)
-    lever = found["r"][-1, 1] - found["r"]
-    assert np.allclose(found["n"], PULL, atol=1e-6)
-    assert np.allclose(found["m"], np.cross(lever, found["n"]), atol=1e-4)
-    assert abs(found["torque"]).max() > 0.2 and abs(found["m"]).max() > 1.0
+    point = at_two(SCENES[name], formulation)
+    assert np.allclose(point.force_in_space, [1.2, 1.6, -2.0], atol=1e-6)
+    assert np.allclose(point.moment_in_space, np.cross(point.r[-1] - point.r, point.force_in_space), atol=1e-4)
+    assert abs(point.moment[:, 2]).max() > 0.2 and abs(point.moment).max() > 1.0
 
 
 @pytest.mark.long
 def test_a_distributed_force_adds_up_along_the_rod() -> None:
     """``n' = -f``, and ``n = 0`` at the free end."""
-    found = at_vertices(scenes()["heavy"])
-    assert np.allclose(found["n"], LOAD * (1.0 - found["s"])[..., None] * [0.0, 0.0, -1.0], atol=1e-9)
-
-
-def test_profiles_of_polynomials() -> None:
-    """Values at nodes are exact, and a jump counts where nothing acts."""
-    ends = np.array([0.0, 0.5, 0.7, 1.0])
-    points = ends[:-1, None] + np.diff(ends)[:, None] * np.linspace(0.0, 1.0, 3)
-    s = np.unique(np.concatenate([np.linspace(a, b, 5) for a, b in pairwise(ends)]))
-    smooth, step = (np.repeat(y[..., None], 3, axis=2) for y in (points**2 - points, (points > 0.5) * 1.0))
-    step[1, 0] = 1.0
-    profiles = Profiles(points, {"k": smooth, "m": step})
-    assert np.allclose(profiles.at_nodes("k", s)[:, 1], s**2 - s)
-    assert profiles.at_nodes("m", s)[s == 0.5] == pytest.approx(0.5)
-    assert (profiles.jump("m"), profiles.jump("m", [0.5])) == (1.0, 0.0) and profiles.jump("k") < 1e-15
+    point = at_two(scenes()["heavy"])
+    assert np.allclose(point.force_in_space, 2.0 * (1.0 - point.s)[:, None] * [0.0, 0.0, -1.0], atol=1e-9)

@@ -1,8 +1,6 @@
 """A state owns its numbers: no other state, load or parameter that is evaluated meanwhile changes them."""
 
-import ast
 from math import pi
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +13,6 @@ from rodfem.fem.state import State, line
 from rodfem.fem.system import System
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
-
-SOURCES = Path(__file__).parents[2] / "rodfem"
 
 
 def numbers(state: State) -> np.ndarray:
@@ -43,22 +39,6 @@ def test_numbers_stay_when_another_state_is_evaluated(name: str) -> None:
     np.testing.assert_array_equal(numbers(state), before)
     with pytest.raises(ValueError, match="read-only"):
         state.local[0] = 1.0
-
-
-@pytest.mark.ranks
-def test_the_state_of_last_time_serves_the_same_values_and_line_alone() -> None:
-    system, x = plain("hemitropic", "reduced", 4, 3, 0.2)
-    x = x.copy()
-    x.array[:] += np.sin(np.arange(len(x.array)))  # the straight rod has the symmetry itself
-    first, generators = system.at(x), system.at(x).generators.copy()
-    x.scale(0.5)
-    second = system.at(x)
-    np.testing.assert_array_equal(second.generators, system.generators.at(second))
-    assert np.abs(second.generators - generators).max() > 1e-3
-    other = system.at(x, line(system.scene, {system.scene.load: 0.3}, {system.scene.load: 2.0}))
-    assert len({id(first), id(second), id(other)}) == 3
-    x.scale(2.0)
-    np.testing.assert_array_equal(system.at(x).generators, generators)
 
 
 @pytest.mark.ranks
@@ -89,19 +69,6 @@ def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> 
     assert (ours - theirs).norm() < 1e-13 * theirs.norm()
 
 
-@pytest.mark.long
-def test_only_states_write_where_forms_read() -> None:
-    """``fields.u`` is named by the equations, in UFL, and by the state; frozen objects are completed by themselves."""
-    for path in sorted(SOURCES.rglob("*.py")):
-        tree, where = ast.parse(path.read_text()), str(path.relative_to(SOURCES))
-        named = {ast.unparse(n).rpartition("self.")[2] for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
-        assert not named & {"fields.u", "f.u", "u.x"} or where in ("fem/equations.py", "fem/state.py"), where
-        own = ("__post_init__", "convert")  # the latter is called in the former
-        inside = [f for f in ast.walk(tree) if isinstance(f, ast.FunctionDef) and f.name in own]
-        allowed = sum(ast.unparse(f).count("object.__setattr__") for f in inside)
-        assert ast.unparse(tree).count("object.__setattr__") == allowed, where
-
-
 @pytest.mark.ranks
 @pytest.mark.versions
 @pytest.mark.short
@@ -129,16 +96,11 @@ def test_stale_factors_refuse() -> None:
 @pytest.mark.ranks
 @pytest.mark.short
 def test_a_stale_pencil_refuses() -> None:
-    """Its eigenvalues and its mass are those of another state; the name of a motion is its own."""
+    """Its eigenvalues are those of another state."""
     system, x = plain("follower", "pointwise", 6, 3, 10.0)
     y, vibration = x.copy(), NonsymmetricSolver(system)
     system.set_load(y, 15.0)
-    first = vibration.at(x)
-    found = first.nearest(2, 0.0)
-    second = vibration.at(y)
-    assert second.nearest(2, 0.0).values != pytest.approx(found.values, rel=1e-3)
-    for ask in (lambda: first.nearest(2, 0.0), lambda: first.weighed(found.vectors)):
-        with pytest.raises(RuntimeError, match="another state"):
-            ask()
-    assert first.motion(found.vectors[:, :1]) == vibration.at(y).motion(found.vectors[:, :1])
-    assert vibration.at(x).nearest(2, 0.0).values == pytest.approx(found.values, rel=1e-10)
+    first, second = vibration.at(x), vibration.at(y)
+    with pytest.raises(RuntimeError, match="another state"):
+        first.nearest(2, 0.0)
+    assert second.nearest(2, 0.0).values != pytest.approx(vibration.at(x).nearest(2, 0.0).values, rel=1e-3)

@@ -25,7 +25,6 @@ from rodfem import (
     Solver,
     clamped,
     free,
-    hinged,
     pinned,
     trace,
 )
@@ -171,86 +170,6 @@ def test_bending_alike_is_told_beside_a_stiff_twist(second: float, number: int, 
         constants={"B2": second, "C": twisting}, inertia=Inertia(lambda c: 1.0),
     )  # fmt: skip
     assert len(System(rod, Discretization("pointwise", 4, 6)).symmetries) == number
-
-
-# --- rods that are symmetric but for little, or for what is round-off next to a stiff strain
-
-
-def hinge(bending: float, spring: float) -> Scene:
-    """A thrust on a rod that is hinged at its foot, in a plane, and held by a spring at its tip: it falls at P = k l.
-
-    Whatever its stiffness the mode is a rigid rotation.
-    """
-    return classics.column(
-        "hinge", (hinged((0.0, 1.0, 0.0)), free(push, energy=lambda x, c: spring * x.r[0] ** 2)), (0.0, 4.0),
-        planar="e2", energy=lambda v, k, c: bending * ufl.dot(k, k) / 2,
-    )  # fmt: skip
-
-
-@pytest.mark.ranks
-@pytest.mark.long
-@pytest.mark.parametrize("bending", [*(pytest.param(b, marks=pytest.mark.alone) for b in (1.0, 1e6, 1e12)), 1e9])
-def test_a_rotation_against_a_spring_is_no_symmetry(bending: float) -> None:
-    """Beside 1e9 a spring of 1 was round-off in the functional, and the rod stable on its whole range, to P = 4."""
-    system = Solver(hinge(bending, 0.5), Discretization(elements=3, degree=4)).equilibria.system
-    assert system.symmetries == []
-
-
-@pytest.mark.ranks
-@pytest.mark.long
-@pytest.mark.parametrize("bending", [1.0, 1e9])
-def test_a_rotation_that_springs_allow_is_one(bending: float) -> None:
-    rod = classics.column(
-        "post", (pinned(), free(push, energy=lambda x, c: x.r[0] ** 2 + x.r[1] ** 2)), (0.0, 4.0),
-        energy=lambda v, k, c: bending * ufl.dot(k, k) / 2,
-    )  # fmt: skip
-    system = Solver(rod, Discretization(elements=3, degree=4)).equilibria.system
-    assert "rotation about e3" in " ".join(map(str, system.symmetries))
-
-
-@pytest.mark.long
-def test_it_is_undecided_where_the_spring_is_round_off() -> None:
-    (branch,) = trace(hinge(1e10, 0.5), Discretization(elements=3, degree=4), Plan(depth=0))
-    assert not any(point.stable for point in branch.points if point.load > 1.0)
-    (branch,) = trace(hinge(1e4, 0.5), Discretization(elements=3, degree=4), Plan(depth=0))
-    special = branch.special[0]
-    assert abs(special.point.load - 1.0) <= special.error_estimate < 1e-6
-
-
-CURVATURE, LEAST = 4e-9, 3e-5
-"""Own curvature of the rod; eigenvalues below the other are not compared: those below 1e-5 count as zero."""
-
-
-@pytest.mark.long
-def test_an_eigenvalue_near_zero_is_no_rotation() -> None:
-    """A round rod on pins, with a curvature that a stiff twist hides: its lowest eigenvalues are 1 - P/pi^2.
-
-    Its turning about itself is the one that is zero.
-    """
-    rod = classics.column(
-        "nearly straight", (pinned(), SLIDING), (9.8, 9.87), ordinate=MIDDLE,
-        energy=lambda v, k, c: (k[0] ** 2 + (k[1] - CURVATURE) ** 2 + 1e4 * k[2] ** 2) / 2,
-    )  # fmt: skip
-    (branch,) = trace(rod, Discretization(elements=6, degree=4), Plan(depth=0))
-    rows = [point for point in branch.points if 1 - point.load / pi**2 > LEAST]
-    assert max(point.load for point in rows) > pi**2 * (1 - 20 * LEAST)
-    assert {(point.negative, point.zero) for point in rows} == {(0, 1)}
-
-
-@pytest.mark.ranks
-@pytest.mark.long
-def test_a_pendulum_beside_a_stiff_twist_falls() -> None:
-    """A rod on a ball joint, pulled and then pushed at its tip by a small force w: both rotations have mu = w.
-
-    Beside a twist 3e7 times as stiff as bending they were zeros of two symmetries, and the rod was stable at w < 0.
-    """
-    rod = classics.column(
-        "pendulum", (pinned(), free(lambda c: (0.0, 0.0, c.P))), (1e-4, -1e-4), constants={"B2": 1.0, "C": 3e7}
-    )
-    (branch,) = trace(rod, Discretization(elements=4, degree=4), Plan(depth=0, error_bars=False))
-    fallen = [point for point in branch.points if point.load < -1e-5]
-    assert len(fallen) > 3
-    assert {point.negative + point.undecided for point in fallen} == {2}
 
 
 @pytest.mark.long

@@ -32,7 +32,6 @@ def test_a_step_is_uphill_where_it_is_too_long(
     e, x, half = beside_a_saddle
     weighed = e.system.new_vector()
     step = linear_step(e.system, x, e.axis, 1.0 / (times * half))
-    assert step is not None
     blocks = Blocks(e.system)
     K = blocks.assemble(x).K
     moved, own = e.system.whole(step.array_r)[blocks.rows], blocks.own(blocks.rows)[1]

@@ -227,9 +227,3 @@ def test_acceleration_of_the_curve_is_a_change_of_length(seed: int) -> None:
 
 def hamilton(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     return value(product(*(ufl.as_vector([float(c) for c in x]) for x in (p, q))))
-
-
-# --- on a finite element space ---------------------------------------------------------------------------------
-
-
-# --- as elements shrink ------------------------------------------------------------------------------------------

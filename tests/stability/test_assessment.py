@@ -21,9 +21,8 @@ from rodfem.kumar_healey.null_space import kernel
 from rodfem.kumar_healey.reduction import ReducedPencil, cayley_shift
 from rodfem.stability import METHODS, find
 from rodfem.stability.assessment import Assessor, Method
-from rodfem.stability.dependence import dependent_equations, smallest_singular, weakest
-from rodfem.stability.near_zero import decide
-from rodfem.stability.pencil import Blocks, Pencil
+from rodfem.stability.dependence import smallest_singular, weakest
+from rodfem.stability.pencil import Pencil
 
 SMALL = (6, 3)
 SOLVERS = [name for name in METHODS if name != "count"]
@@ -93,16 +92,6 @@ def test_methods_agree_with_other_ends_and_constraints(name: str, formulation: s
         found = assessor(x, method, 3)
         np.testing.assert_allclose(found.values, expected.values, rtol=1e-9, err_msg=method)
         assert found.certified, method
-
-
-@pytest.mark.parametrize("load", [10.0, 20.0, 40.0])
-def test_methods_agree_without_symmetry(load: float) -> None:
-    system, x = plain("follower", "pointwise", *SMALL, load)
-    assessor = Assessor(system)
-    expected = assessor(x, "dense", 4)
-    for method in ("auto", "reduction"):
-        np.testing.assert_allclose(assessor(x, method, 4).values, expected.values, rtol=1e-9, err_msg=method)
-    assert expected.stable == (load < 20.05)
 
 
 def test_names() -> None:
@@ -214,16 +203,6 @@ def test_ten_thousand_elements() -> None:
         assert Assessor(solver.system)(x, "count").negative == negative
 
 
-def test_quotients_decide_within_a_wide_band() -> None:
-    """Where round-off of the count is said to be large, signs of eigenvalues inside are those of their quotients."""
-    solver = Solver(scene("cord"), Discretization("reduced", 8, 6)).equilibria
-    solver.system.set_phase(None)
-    solver.inertia.tolerance = solver.inertia.resolution = 1e-2
-    for load, negative in ((49.3475, 1), (49.3485, 0)):
-        found = decide(solver.inertia.at(solver.at_load(solver.start(load), load)[0]))
-        assert len(found.inside) == 1 and (found.index.negative, found.index.zero) == (negative, 0)
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("method", SOLVERS)
 def test_an_unstable_direction_without_mass(method: str) -> None:
@@ -262,13 +241,11 @@ def test_smallest_singular_value(formulation: str) -> None:
         assert smallest_singular(pencil.C)[0] == pytest.approx(np.linalg.svd(C, compute_uv=False)[-1], rel=1e-9)
 
 
-def test_smallest_singular_value_is_of_the_size_of_an_element() -> None:
-    ratios = []
-    for n in (50, 100, 200):
-        solver = Solver(scene("cord"), Discretization("pointwise", n, 1)).equilibria
-        pencil = Coordinates(solver.system).assemble(solver.start(20.0))
-        ratios.append(smallest_singular(pencil.C)[0] * n)
-    assert abs(np.diff(ratios)).max() < 0.05 * ratios[-1]
+def test_smallest_singular_value_of_many_constraints() -> None:
+    """Of more than 300 it is found by inverse iteration."""
+    system = Solver(scene("cord"), Discretization("pointwise", 110, 1)).equilibria
+    C = Coordinates(system.system).assemble(system.start(20.0)).C
+    assert smallest_singular(C)[0] == pytest.approx(np.linalg.svd(C.toarray(), compute_uv=False)[-1], rel=1e-9)
 
 
 def test_round_off_is_no_independence() -> None:
@@ -277,25 +254,11 @@ def test_round_off_is_no_independence() -> None:
 
     def least(C: list[list[float]], length: float) -> float:
         pencil = Pencil(unit, sp.csr_matrix(np.array(C)), unit, where, np.zeros(2))
-        found = weakest(pencil, np.zeros(0, dtype=int), length)
-        assert found is not None
-        return found[0]
+        return weakest(pencil, np.zeros(0, dtype=int), length)[0]
 
     assert least([[1.0, 1.0], [0.0, 1e-16], [0.0, 0.0]], 1.0) < 1e-15
     # a rotation and a position, in a rod of the length 1e-13
     assert least([[1.0, -1.0], [0.0, 0.0], [1e13, 1e13]], 1e-13) == pytest.approx(1.0)
-
-
-def test_dependent_constraints_are_named() -> None:
-    system, x = plain("hemitropic", "reduced", *SMALL, 0.2)
-    pencil = Blocks(system).assemble(x)
-    C, last = pencil.C.tolil(), pencil.where["scalars"]
-    C[:, last[0]] = C[:, last[1]]
-    sigma, vector = smallest_singular(C)
-    assert sigma < 1e-13
-    np.testing.assert_allclose(abs(vector[last[:2]]), 2**-0.5, rtol=1e-6)
-    twin = replace(pencil, C=C.tocsr(), where=pencil.where | {"eta": np.zeros(0, dtype=int)})
-    assert dependent_equations(twin, ["one end", "the other", "none"], vector) == "one end and the other"
 
 
 # --- the method of Kumar and Healey (2010) ---------------------------------------------------------------------
@@ -368,31 +331,6 @@ def test_spins_fulfil_the_norm_conditions(formulation: str) -> None:
 
 
 # --- kernels ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("groups", [1, 2, 3, 8, 13])
-def test_kernel_of_random_chains(groups: int) -> None:
-    """Groups and links of any widths, rows without entries, and dense columns on top."""
-    rng = np.random.default_rng(groups)
-    widths = rng.integers(1, 4, groups)
-    starts = np.append(0, np.cumsum(widths))
-    rows = []
-    for link in range(groups + 1):
-        for _ in range(rng.integers(4, 9)):
-            row = np.zeros(starts[-1] + 2)
-            a, b = starts[max(link - 1, 0)], starts[min(link + 1, groups)]
-            row[a:b] = rng.normal(size=b - a)
-            row[-2:] = rng.normal(size=2)
-            rows.append(row)
-    rows += [np.zeros(starts[-1] + 2)] * 3
-    C = np.array(rows)[rng.permutation(len(rows))]
-    columns = rng.permutation(C.shape[1])
-    place = np.append(np.repeat(np.linspace(-2, 5, groups), widths), [np.nan, np.nan])
-    found = kernel(sp.csr_matrix(C[:, columns]), place[columns])
-    Z = found.expand(np.eye(found.dimension))
-    assert Z.shape == (C.shape[0], C.shape[0] - C.shape[1])
-    np.testing.assert_allclose(Z.T @ Z, np.eye(found.dimension), atol=1e-13)
-    np.testing.assert_allclose(C.T @ Z, 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("formulation", ["reduced", "pointwise"])

@@ -12,7 +12,7 @@ from rodfem import Discretization, Parameter, Scene, Solver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.diagram.equilibria import at_load
 from rodfem.linalg.matrices import EPS, gathered
-from rodfem.stability.cluster import Cluster, Measured, closed, measure, noise_of, real_span
+from rodfem.stability.cluster import Cluster, Measured, measure, noise_of, real_span
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.nonsymmetric import NonsymmetricPencil, NonsymmetricSolver
 
@@ -67,20 +67,3 @@ def test_what_an_eigensolver_leaves_open() -> None:
     off = replace(measured, discriminant=measured.discriminant * (1 + 1e-6))
     assert (left := noise_of(pencil, off)).discriminant_left == pytest.approx(1e-6 * measured.discriminant, rel=1e-3)
     assert left.of_discriminant >= left.discriminant + left.discriminant_left
-
-
-@pytest.mark.parametrize(
-    ("values", "share", "size", "chosen"),
-    [
-        ([1, 2, 3], [0.1, 0.9, 0.8], 2, [1, 2]),
-        ([1, 2 + 1j, 2 - 1j], [0.9, 0.6, 0.6], 2, [1, 2]),
-        ([1, 3, 2 + 1j, 2 - 1j], [0.9, 0.8, 0.6, 0.6], 2, [0, 1]),
-        ([1, 2 + 1j, 2 - 1j, 3 + 1j, 3 - 1j], [0.1, 0.8, 0.8, 0.7, 0.7], 4, [1, 2, 3, 4]),
-        ([1, 2 + 1j, 2 - 1j], [0.9, 0.6, 0.6], 1, [0]),
-        ([2 + 1j, 2 - 1j], [0.6, 0.6], 1, []),
-    ],
-)
-def test_a_cluster_is_closed_under_conjugation(
-    values: list[complex], share: list[float], size: int, chosen: list[int]
-) -> None:
-    assert closed(np.array(values, dtype=complex), np.array(share), size) == chosen

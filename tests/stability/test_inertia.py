@@ -108,15 +108,6 @@ def test_close_eigenvalues_nearest_zero() -> None:
     np.testing.assert_allclose(sorted(values), sorted(expected), rtol=1e-9)
 
 
-def test_a_mesh_has_fewer_motions_than_are_asked_for() -> None:
-    """Two nodes between clamps have eight components, of which their unit norms leave six."""
-    f = follower("reduced", 3, 1)
-    factored = f.inertia.at(f.at_load(f.start(0.1), 0.1)[0])
-    mu = eigenvalues(dense(factored.matrix), dense(f.system.metric), f)
-    factored.count()
-    np.testing.assert_allclose(sorted(factored.nearest(8)[0]), mu, rtol=1e-9)
-
-
 @pytest.mark.few(1)
 def test_the_matrix_is_kept_for_the_state_that_it_holds() -> None:
     """Asked for the same state again it is not assembled or factored; it is after a shift, and for another state."""

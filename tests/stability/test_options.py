@@ -13,7 +13,6 @@ from rodfem.fem.system import System
 from rodfem.kumar_healey.coordinates import Coordinates
 from rodfem.kumar_healey.reduction import ReducedPencil
 from rodfem.stability.assessment import Assessor, in_interval
-from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
 ORDERING = 2
 """MUMPS's approximate minimum fill: not what rodfem asks for."""
@@ -27,19 +26,6 @@ def options() -> Iterator[PETSc.Options]:
     yield found
     for name in set(found.getAll()) - before:
         found.delValue(name)
-
-
-def test_nothing_is_left_in_the_database(options: PETSc.Options) -> None:
-    before = options.getAll()
-    system, x = cord()
-    system.at(x).factor(system.load_axis())
-    assessor = Assessor(system)
-    for method in ("count", "shift-invert", "slicing"):
-        assessor(x, method, 2)
-    system, x = plain("follower", "pointwise", 6, 3, 10.0)
-    vibration = NonsymmetricSolver(system).at(x)
-    vibration.nearest(2, 0.0)
-    assert options.getAll() == before
 
 
 def cord(factors: str = "chain") -> tuple[System, PETSc.Vec]:

@@ -20,7 +20,6 @@ from rodfem.app.terminal import Report
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.pieces import UNDECIDED, UNSTABLE, pieces_of, typical_state
-from rodfem.stability.soft_mode import SoftMode, index_range, is_stable, stability
 
 SLIDING = "sliding along the rod"
 
@@ -29,21 +28,6 @@ def nearly_free(k: float) -> Scene:
     """A rod on a ball joint with a spring of stiffness k: it swings rigidly, at no load with the eigenvalue k."""
     joint = replace(pinned(), energy=lambda x, c: loads.rotational_spring(x.q, c.k))
     return column("nearly free", (joint, free(push)), (-1.0, 1.0), constants={"k": k})
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize(
-    ("k", "stable", "index"), [(1e-4, True, 0), pytest.param(1e-8, True, 0, marks=pytest.mark.short), (-1e-6, False, 3)]
-)
-def test_an_end_nearly_free_to_turn(k: float, stable: bool, index: int) -> None:
-    solver = Solver(nearly_free(k), Discretization("reduced", 4, 4))
-    point = solver.equilibrium(0.0)
-    assert (point.stable, point.negative, point.zero, point.undecided) == (stable, index, 0, 0)
-    assert [m.value for m in point.soft] == pytest.approx([k] * 3, rel=1e-3)
-    assert all(m.decided and m.name.startswith("rotation about") for m in point.soft)
-    verdict = solver.assess(point)
-    assert (verdict.stable, verdict.negative, verdict.undecided) == (stable, index, 0)
-    assert [m.name for m in verdict.soft] == [m.name for m in point.soft]
 
 
 @pytest.mark.few(1)
@@ -165,15 +149,6 @@ def test_a_bent_cantilever_that_is_nearly_round_has_one_name_for_its_rotation() 
         (mode,) = diagram.assess(point).soft
         assert mode.name == "rotation about e3 with turning of the cross-sections about d3"
         assert mode.name in diagram.modes(point, 2).motion and "mixed" not in diagram.modes(point, 2).motion
-
-
-def test_words() -> None:
-    assert [index_range(*x) for x in ((2, 0), (0, 1), (0, 2), (1, 1))] == ["2", "0 or 1", "0 to 2", "1 or 2"]
-    assert [is_stable(stability(*x)) for x in ((0, 0), (0, 1), (1, 1))] == [True, None, False]
-    assert [is_stable(stability(0, 0, *x)) for x in (("a kink",), ("", 0), ("", 1))] == [None, True, False]
-    mode = SoftMode(SLIDING, 7.5e-6, 2e-5)
-    assert str(mode) == "sliding along the rod, mu = 7.5e-06 +- 2e-05, sign undecided"
-    assert str(replace(mode, uncertainty=2e-6)) == "sliding along the rod, mu = 7.5e-06 +- 2e-06"
 
 
 def test_undecided_pieces_have_a_style_of_their_own() -> None:
