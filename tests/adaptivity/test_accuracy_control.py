@@ -17,12 +17,10 @@ from closed_forms import elastica
 
 from rodfem import Branch, Diagram, InputError, Plan, Scene, Solver, run, trace
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, USER
-from rodfem.fem.fields import Discretization, Fields
+from rodfem.fem.fields import Discretization
 from rodfem.output.files import load_state
 
 ACCURACIES = pytest.mark.parametrize("accuracy", [1e-4, 1e-6, 1e-10])
-CORD = {"fold": 7.8065554232, "shortening": 0.5793314271, "points": (49.34802200544679, 8.063525384097708)}
-"""Spectral collocation and shooting; ``k0^2 - w^2`` with ``w = 2 pi`` and ``tan(w/2) = w/2``."""
 
 
 def explored(scene: Scene, accuracy: float, at: tuple[float, ...] = (), depth: int = 1) -> Diagram:
@@ -140,24 +138,7 @@ def test_elements_beside_an_accuracy() -> None:
     assert kept.solvers[0].system.fields.discretization == graded and not kept.notes
 
 
-@pytest.mark.parametrize("accuracy", [0.0, -1e-6, 1e-20, 1.0, float("nan"), float("inf")])
-def test_bad_accuracy(accuracy: float) -> None:
-    scene = hemitropic_cases.scene()
-    with pytest.raises(InputError, match=r"is not attainable: ask for one between 1e-11 .round-off. and 0.1"):
-        Plan(scene.span, accuracy=accuracy).check(scene)
-
-
 def test_a_sweep_has_one_mesh() -> None:
     scene = demo_cases.scene("follower")
     with pytest.raises(InputError, match="is swept on one mesh"):
         Plan(scene.span, accuracy=1e-4).check(scene)
-
-
-@pytest.mark.few(2)
-@pytest.mark.parametrize(
-    ("vertices", "words"),
-    [((0.0, 0.5), "2 vertices"), ((0.0, 0.7, 0.5, 1.0), "ascend"), ((0.0, 0.2, 0.5, 0.9), "begin and end at 0 and 1")],
-)
-def test_bad_vertices(vertices: tuple[float, ...], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        Fields(boundary_layer.scene(), Discretization("auto", 3, 4, vertices))

@@ -8,17 +8,16 @@ from math import pi
 
 import numpy as np
 import pytest
+from classics import SUPPORTS, column
 
-from rodfem import Discretization, Ordinate, Plan, Scene, clamped, free, trace
+from rodfem import Discretization, Plan, trace
 
 
 @pytest.mark.parametrize("planar", ["e2", None])
 def test_a_column_that_may_be_compressed(planar: str | None) -> None:
-    scene = Scene(
-        "column", (0.0, 1.0), "unshearable",
-        lambda v, k, c: 0.5 * (c.EA * (v[2] - 1) ** 2 + 2.0 * k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
-        {"P": 0.0, "EA": 20.0}, "P", (clamped(), free(lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (0.0, 4.0), planar=planar,
+    scene = column(
+        "column", SUPPORTS["clamped-free"], (0.0, 4.0), rod="unshearable", constants={"EA": 20.0}, planar=planar,
+        energy=lambda v, k, c: 0.5 * (c.EA * (v[2] - 1) ** 2 + 2.0 * k[0] ** 2 + k[1] ** 2 + k[2] ** 2),
     )  # fmt: skip
     diagram = trace(scene, Discretization("auto", 6, 6), Plan(depth=0, error_bars=False))
     locus = diagram.locus(diagram.special("branch point")[0], "EA", (11.0, 20.0))

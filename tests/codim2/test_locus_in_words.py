@@ -7,25 +7,19 @@ import classics
 import numpy as np
 import pytest
 
-from rodfem import Diagram, Discretization, InputError, Ordinate, Parameter, Plan, Scene, clamped, free, trace
+from rodfem import Diagram, Discretization, InputError, Plan, clamped, free, trace
 from rodfem.codim2.locus import COARSE
 from rodfem.forms import loads
-from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_locus import in_words, stable_region
 from rodfem.report.branches import _readings
 
 MESH = Discretization("auto", 4, 6)
 
 
-def column(B1: float, planar: str = "") -> Diagram:
+def column(B1: float, planar: str | None = None) -> Diagram:
     """A column of bending stiffnesses ``B1`` and 1 under a thrust at its free end."""
-    scene = Scene(
-        "column", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: bending_and_twist(k, (c.B1, c.B2, 1.0)),
-        {"P": Parameter(0.0), "B1": Parameter(B1), "B2": Parameter(1.0)}, "P",
-        (clamped(), free(lambda c: (0.0, 0.0, -c.P))), Ordinate("tip", s=1.0, of=lambda r, q: float(r[0])), (0.0, 3.0),
-        planar=planar or None,
-    )  # fmt: skip
+    constants = {"B1": B1, "B2": 1.0}
+    scene = classics.column("column", classics.SUPPORTS["clamped-free"], (0.0, 3.0), constants=constants, planar=planar)
     return trace(scene, MESH, Plan(depth=0))
 
 

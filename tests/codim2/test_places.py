@@ -9,15 +9,12 @@ import pytest
 import rescaled
 from hard.two_freedoms import scene
 
-from rodfem import Diagram, Discretization, Locus, Ordinate, Parameter, Plan, Scene, clamped, free, trace
+from rodfem import Diagram, Discretization, Locus, Plan, trace
 from rodfem.continuation.kinds import BRANCH_POINT, DIVERGENCE, FLUTTER, FOLD
 from rodfem.forms.energy import bending_and_twist
 
-TURNS_IN_LOAD, TURNS_IN_SHARE, DIVERGES = (
-    (16.052461577163431, 0.5),
-    (19.422070332597733, 0.32112652696656004),
-    (pi**2, 0.5),
-)
+TURNS_IN_LOAD, TURNS_IN_SHARE = (16.052461577163431, 0.5), (19.422070332597733, 0.32112652696656004)
+DIVERGES = pi**2, 0.5
 """Load and share of a thrust that follows, of the column of two flutter loads and a divergence load."""
 DOUBLE_ZERO = 17.0695747744975, 0.3543133021536
 
@@ -106,11 +103,9 @@ def test_a_coarse_mesh_displaces_turning_points_along_the_curve() -> None:
 @pytest.mark.long
 def test_stiffness_with_a_minimum() -> None:
     """``P = (1 + (b - 0.3)^2) pi^2/4``."""
-    rod = Scene(
-        "column", (0.0, 1.0), "unshearable and inextensible",
-        lambda v, k, c: (1 + (c.b - 0.3) ** 2) * bending_and_twist(k, (5.0, 1.0, 3.0)),
-        {"P": Parameter(0.0), "b": Parameter(0.0)}, "P", (clamped(), free(force=lambda c: (0.0, 0.0, -c.P))),
-        Ordinate("tip", s=1.0, of=lambda r, q: r[0]), (0.0, 4.0), planar="e2",
+    rod = classics.column(
+        "column", classics.SUPPORTS["clamped-free"], (0.0, 4.0), planar="e2", constants={"b": 0.0},
+        energy=lambda v, k, c: (1 + (c.b - 0.3) ** 2) * bending_and_twist(k, (5.0, 1.0, 3.0)),
     )  # fmt: skip
     diagram = trace(rod, Discretization("auto", 4, 6), Plan(depth=0))
     check(diagram.locus(diagram.special(BRANCH_POINT)[0], "b", (0.0, 1.0), (0.0, 5.0)), "turns in P", (pi**2 / 4, 0.3))
@@ -119,13 +114,8 @@ def test_stiffness_with_a_minimum() -> None:
 @pytest.mark.long
 def test_fold_that_ends_on_a_branch_point() -> None:
     """The branch ``P = f/sin f - 1 + b f2 + f2^2``, ``f2 = 2 - 2 cos f``, begins with ``(b + 1/6) f^2``."""
-    model = scene(
-        lambda u, f2, c: 0.5 * c.a * u * u - 0.5 * c.P * f2 + 0.25 * c.b * f2**2 + f2**3 / 6,
-        (-0.3, 0.3),
-        a=1.0,
-        b=-1 / 6 - 1e-2,
-    )
-    diagram = trace(model, Discretization("auto", 4, 3), Plan(depth=1))
+    potential = lambda u, f2, c: 0.5 * c.a * u * u - 0.5 * c.P * f2 + 0.25 * c.b * f2**2 + f2**3 / 6  # noqa: E731
+    diagram = trace(scene(potential, (-0.3, 0.3), a=1.0, b=-1 / 6 - 1e-2), Discretization("auto", 4, 3), Plan(depth=1))
     found = diagram.locus(diagram.special(FOLD)[0], "b", (-0.3, 0.1), (-0.3, 0.3))
     check(found, "the fold ends on a branch point", (0.0, -1 / 6))
     assert any("or turns back within 1e-05 of the bounds from one" in why for why in found.ended)

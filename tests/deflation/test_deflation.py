@@ -123,39 +123,6 @@ def test_deflated_iteration_ends_at_the_same_step_in_all_units() -> None:
 
 
 @pytest.mark.ranks
-def test_step_is_newtons_for_the_deflated_equations() -> None:
-    """The rescaled step ``d`` solves ``G'(x) d = -G(x)``, with ``G'`` by differences, next to points and to circles."""
-    for follower, load in ((ruler().solvers[0], 6.0), (hemitropic_cases.follower(), 0.35)):
-        search = Deflation(follower, load)
-        search.run(3)
-        system = follower.system
-        x = turned_state(system, search.found[0].x, 0.5, [3])
-        system.set_phase(x)
-
-        def deflated(t: float, direction: object, x=x, search=search, system=system) -> object:
-            y, out = x.copy(), system.new_vector()
-            y.axpy(t, direction)
-            system.at(y).residual(out)
-            out.scale(float(np.prod([1 + 1 / d**2 for d, _ in search.known.nearest(y)])))
-            return out
-
-        step, plain = system.new_vector(), system.new_vector()
-        value = deflated(0.0, step)
-        state = system.at(x)
-        state.residual(plain)
-        state.factor(follower.axis)
-        system.solve(plain, step)
-        step.scale(-1.0)
-        step.scale(search.rescaling(x, step))
-        h = 1e-6 / system.norm(step)
-        slope = deflated(h, step)
-        slope.axpy(-1.0, deflated(-h, step))
-        slope.scale(1 / (2 * h))
-        slope.axpy(1.0, value)
-        assert slope.norm() < 1e-5 * value.norm()
-
-
-@pytest.mark.ranks
 def test_guesses_do_not_depend_on_ranks() -> None:
     system = ruler().solvers[0].system
     straight = ruler().solvers[0].start(1.0)

@@ -53,19 +53,6 @@ def test_against_qz(name: str, part: float) -> None:
         assert abs(nu[:, None] - all_others).min(axis=1).max() < 1e-9 * abs(nu).max()
 
 
-def test_slepc_may_give_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At times it cannot sort equal complex eigenvalues: up to a rank of a thousand LAPACK finds them."""
-
-    def giving_up(*_: object) -> None:
-        raise ConvergenceError("SLEPc cannot sort.")
-
-    solver = Solver(classics.beck(), Discretization("pointwise", 8, 6)).equilibria
-    spectrum = NonsymmetricSolver(solver.system).at(at_load(solver, solver.start(10.0), 10.0)).spectrum
-    expected = spectrum.greatest(5).nu
-    monkeypatch.setattr("rodfem.stability.spectrum.krylov", giving_up)
-    np.testing.assert_allclose(spectrum.greatest(5).nu, expected, rtol=1e-9)
-
-
 def test_two_beyond_the_fortieth_meet_first() -> None:
     """Soft in torsion, with dozens of motions below the first that bends: no pair nearer to zero ever meets."""
     inertia = Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 1.0))
@@ -94,3 +81,16 @@ def test_planes_that_pass_one_another_never_meet(monkeypatch: pytest.MonkeyPatch
     diagram = trace(scene, Discretization("pointwise", 4, 6), plan)
     assert not diagram.special("flutter") and not diagram.warnings
     assert len(computed) == len(diagram[0].points) + 1 == 22  # the first one twice
+
+
+def test_slepc_may_give_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At times it cannot sort equal complex eigenvalues: up to a rank of a thousand LAPACK finds them."""
+
+    def giving_up(*_: object) -> None:
+        raise ConvergenceError("SLEPc cannot sort.")
+
+    solver = Solver(classics.beck(), Discretization("pointwise", 8, 6)).equilibria
+    spectrum = NonsymmetricSolver(solver.system).at(at_load(solver, solver.start(10.0), 10.0)).spectrum
+    expected = spectrum.greatest(5).nu
+    monkeypatch.setattr("rodfem.stability.spectrum.krylov", giving_up)
+    np.testing.assert_allclose(spectrum.greatest(5).nu, expected, rtol=1e-9)

@@ -7,14 +7,11 @@ from typing import Any
 import classics
 import numpy as np
 import pytest
-from petsc4py import PETSc
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipk
 
 import rodfem
 from rodfem import Discretization, Event, InputError, Level, Plan, clamped, sliding
-from rodfem.continuation import arc
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.forms.energy import bending_and_twist
 
 
@@ -145,30 +142,6 @@ def test_zeros_between_rows_and_beside_them(kind: str) -> None:
         assert len(points) == len(loads)
         assert all(abs(s.point.load - P) <= s.located_to + LEFT for s, P in zip(points, loads, strict=True))
     assert not found.warnings
-
-
-@pytest.mark.long
-def test_states_with_round_off_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Equilibria that are solved for differ by 1e-8, as beside a soft mode: each event is within its bar."""
-    chosen, solve = np.random.default_rng(4), arc.corrected
-
-    def rough(solver: BranchSolver, start: PETSc.Vec, row: PETSc.Vec) -> PETSc.Vec:
-        x, aside = solve(solver, start, row), solver.system.new_vector()
-        solver.system.set_load(aside, 1.0)
-        along = solver.tangent(row, at=x)
-        aside.axpy(-row.dot(aside) / row.dot(along), along)  # on the plane on which the state is solved for
-        return x + aside * (1e-8 * chosen.normal())
-
-    touches = tuple(
-        Event(f"at {b:.2f}", of=lambda state, b=b: (state.load - b) ** 2) for b in np.linspace(1.5, 3.5, 41)
-    )
-    tips = tuple(Event(f"tip {c:.2f}", of=lambda state, c=c: state.r[-1, 0] - c) for c in np.linspace(0.06, 0.18, 9))
-    plan = replace(PLAN, events=touches + tips)
-    exact = {s.note: s.point.load for s in rodfem.trace(COLUMN, MESH, plan)[0].special if s.event}
-    monkeypatch.setattr(arc, "corrected", rough)
-    found = [s for s in rodfem.trace(COLUMN, MESH, plan)[0].special if s.event]
-    assert len(found) == len(exact) == 50
-    assert all(abs(s.point.load - exact[s.note]) <= s.located_to < 1e-6 for s in found)
 
 
 def test_a_sweep_refuses_events() -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from classics import SUPPORTS, column
 from demo_cases import module
 
 import rodfem
-from rodfem import Diagram, Discretization, Inertia, Plan, Scene, SceneError, Solver, clamped, free
+from rodfem import Diagram, Discretization, Inertia, Plan, Scene, Solver, clamped, free
 
 MESH = Discretization("auto", 4, 4)
 Statement = Callable[..., Scene]
@@ -70,12 +69,6 @@ def test_diagram_of_a_scene_of_its_own(case: str) -> None:
     same(first, first.again())
 
 
-def test_symmetries_are_those_of_the_constants() -> None:
-    solver = Solver(alike(), MESH)
-    counts = [len(solver.rebind(B2=B2).equilibria.system.symmetries) for B2 in (1.0, 2.0, 1.0)]
-    assert counts[0] == counts[2] == counts[1] + 1
-
-
 def test_solvers_that_share_forms_take_turns() -> None:
     """Energies, and what dolfinx evaluates, are those of the constants of each state."""
     one = Solver(hemitropic(), MESH)
@@ -99,17 +92,3 @@ def test_a_constant_that_asks_for_other_unknowns() -> None:
     fields = [solver.equilibria.system.fields for solver in (light, heavy, heavy.rebind(k=0.0))]
     assert [f.formulation.name for f in fields] == ["reduced", "pointwise", "reduced"]
     assert ["r" in f.dofs for f in fields] == [False, True, False]
-
-
-def test_other_functions_share_nothing() -> None:
-    rod = alike()
-    others = rod, replace(rod, energy=lambda v, k, c: rod.energy(v, k, c)), replace(rod, interval=(0.0, 2.0))
-    forms = [Solver(scene, MESH).equilibria.system.equations.jacobian for scene in others]
-    assert len({id(form) for form in forms}) == 3
-    assert Solver(replace(rod, span=(0.0, 3.0)), MESH).equilibria.system.equations.jacobian is forms[0]
-
-
-@pytest.mark.parametrize(("given", "words"), [({"x": 1.0}, "'x' is not a parameter"), ({"B1": -1.0}, "not convex")])
-def test_constants_that_are_none(given: dict[str, Any], words: str) -> None:
-    with pytest.raises(SceneError, match=words):
-        Solver(alike(), MESH).rebind(**given)

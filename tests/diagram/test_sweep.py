@@ -18,9 +18,6 @@ from rodfem.output.plot_diagram import dense
 from rodfem.output.plot_frequencies import curves, figure_of, ranges_of
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
-PILE = 64
-"""States after which what PETSc keeps of matrices that are not used any more is destroyed."""
-
 
 def swept(scene: Scene, monkeypatch: pytest.MonkeyPatch, loads: int = 26) -> tuple[Branch, dict, str]:
     """Frequencies over the range of a scene: branch, diagram, and what the terminal shows."""

@@ -21,20 +21,6 @@ def diagram() -> Diagram:
     return rodfem.trace(scene(), depth=2, at=(0.5,))
 
 
-def test_the_lines_of_a_notebook(diagram: Diagram) -> None:
-    (point, *_) = [p for p in diagram.at(0.5) if p.stable]
-    assert point.r.shape == (len(point.s), 3) and point.branch == "branch 1"
-    assert point.directors.shape[1:] == (3, 3) and point.force.shape == point.moment.shape == point.r.shape
-    assert point.reactions.left.force.shape == (3,)
-    assert diagram["branch 1"]["load"].max() == pytest.approx(0.95)
-    assert [s.freedoms for s in diagram.states(0.5) if s.point.branch == "branch 1"] == [1]
-    assert [s.point.branch for s in diagram.special("pitchfork")] == ["straight", "straight"]
-    assert [s.kind for s in diagram.special("subcritical pitchfork")] == ["branch point"]
-    assert not diagram.special("transcritical") and diagram.special("fold")
-    with pytest.raises(InputError, match=r"There is no kind 'fork': choose one of branch point, fold, .*pitchfork"):
-        diagram.special("fork")
-
-
 def test_twenty_wishes_are_a_line_each(diagram: Diagram) -> None:
     """What took a person a dozen tries, with its shape or its value."""
     point, branch = next(p for p in diagram.at(0.5) if p.stable), diagram["branch 1"]
@@ -47,12 +33,20 @@ def test_twenty_wishes_are_a_line_each(diagram: Diagram) -> None:
     assert point.profile([0.0, 0.5]).r.shape == (2, 3)
     assert np.allclose(point.reactions.left.force + point.reactions.right.force, 0.0, atol=1e-9)
     assert point.branch == "branch 1"
-    assert branch["load"].shape == (len(branch.points),)
+    assert branch["load"].shape == (len(branch.points),) and branch["load"].max() == pytest.approx(0.95)
     assert list(branch.to_dataframe().load) == list(branch["load"])
     assert set(diagram.to_dataframe().branch) == {"straight", "branch 1", "branch 2"}
     assert diagram.to_xarray()["r"].dims == ("point", "node", "component")
-    assert [s.negative_before for s in diagram.special("pitchfork")] == [0, 2]
+    assert [(s.negative_before, s.point.branch) for s in diagram.special("pitchfork")] == [
+        (0, "straight"),
+        (2, "straight"),
+    ]
+    assert [s.kind for s in diagram.special("subcritical pitchfork")] == ["branch point"]
+    assert not diagram.special("transcritical")
+    with pytest.raises(InputError, match=r"There is no kind 'fork': choose one of branch point, fold, .*pitchfork"):
+        diagram.special("fork")
     assert len(diagram.states(0.5)) == 3
+    assert [s.freedoms for s in diagram.states(0.5) if s.point.branch == "branch 1"] == [1]
     assert diagram.plot(ax=axes) is axes.figure
     assert diagram.view()._repr_html_().startswith("<iframe")
     assert fold.errors["energy"] > 0.0 and fold.errors["reactions"].shape[-1] == 3

@@ -15,11 +15,11 @@ from scipy.spatial.transform import Rotation
 from small_states import buckled, plain
 from small_states import solver as solver_of
 
-from rodfem import ConvergenceError, Discretization, InputError, Scene, Solver
+from rodfem import ConvergenceError, Discretization, Scene, Solver
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.first_equilibrium import first_equilibrium
 from rodfem.modes.finder import ModeFinder, Motions
-from rodfem.modes.modes import SYMMETRY, Modes, load_modes, save_modes
+from rodfem.modes.modes import SYMMETRY, Modes
 
 FINE = Discretization("reduced", 6, 6)
 METHODS = ("shift-invert", "cayley", "slicing", "reduction")
@@ -215,47 +215,6 @@ def test_planar_rod_stays_in_its_plane() -> None:
 
 
 # --- files ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.long
-@pytest.mark.versions
-def test_file(folder: Path) -> None:
-    scene = classics.beck(span=(1.0, 35.0))
-    modes = modes_of(*state(scene, Discretization("pointwise", 6, 6), 30.0), 2)
-    if MPI.COMM_WORLD.rank:
-        return
-    path = folder / "modes.h5"
-    save_modes(modes, path, "branch 1", 7, {"title": scene.title}, first=True)
-    again = load_modes(path, "branch 1", 7)
-    np.testing.assert_array_equal(again.displacement, modes.displacement)
-    assert again.motion == modes.motion
-    with pytest.raises(InputError, match="has no modes of row 3 of a branch 'branch 1': it has branch 1, row 7"):
-        load_modes(path, "branch 1", 3)
-    with pytest.raises(InputError, match=r"No such file.*: give the modes.h5 of a run with Plan.modes="):
-        load_modes(folder / "nothing.h5", "branch 1", 3)
-
-
-@pytest.mark.long
-@pytest.mark.versions
-@pytest.mark.short
-def test_command_line(folder: Path, capfd: pytest.CaptureFixture) -> None:
-    common = ("--range", "0", "0.25", "--at", "0.2", "--no-figures", "--output", str(folder))
-    run_demo(*common, "--modes", "2", "--method", "cayley")
-    out = capfd.readouterr().out
-    if MPI.COMM_WORLD.rank == 0:
-        assert "straight, lam = 0.2: unstable, index 2" in out
-        assert "branch 1, lam = 0.2: stable, 1 zero" in out
-        assert "cayley (as asked), counts prove that none is missing" in out
-        with h5py.File(folder / "modes.h5") as file, h5py.File(folder / "states.h5") as states:
-            assert list(file["branches"]) == ["branch 1", "straight"]
-            ((row, group),) = file["branches/branch 1"].items()
-            np.testing.assert_allclose(group["r"][:], states["branches/branch 1/r"][int(row)], atol=1e-14)
-            assert group["motion"].asstr()[-1] == SYMMETRY
-            assert group["displacement"].shape == group["weight_rotation"].shape == (3, len(group["s"]), 3)
-    run_demo(*common, "--method", "count", "--verbose")
-    out = capfd.readouterr().out
-    if MPI.COMM_WORLD.rank == 0:
-        assert "count (as asked)" in out and "2 factorisations, " in out
 
 
 @pytest.mark.long

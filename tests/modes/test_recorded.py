@@ -63,16 +63,6 @@ def test_a_double_eigenvalue_has_one_mode(folder: Path, mesh: tuple[int, int]) -
     np.testing.assert_allclose(moved / moved[-1], exact / exact[-1], atol=1e-4)
 
 
-@pytest.mark.long
-def test_a_trace_is_the_same_with_and_without_them(folder: Path) -> None:
-    """Modes are computed between two branches: nothing of the next one may depend on that, not even its last bit."""
-    plan = Plan((0.0, 12.0), depth=2, error_bars=False)
-    rodfem.run(classics.euler("clamped-free"), MESH, plan, folder, figures=False, quiet=True)
-    alone = rodfem.trace(classics.euler("clamped-free"), MESH, plan)
-    saved = json.loads((folder / "diagram.json").read_text())["branches"]
-    assert saved == json.loads(json.dumps(alone.data["branches"]))
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("fault", [lambda: ConvergenceError("No eigenvalue was found."), MemoryError])
 @pytest.mark.parametrize("often", [1, 100])
