@@ -3,8 +3,6 @@
 import io
 import json
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -124,24 +122,6 @@ def test_branch_points_below_the_depth_are_counted(folder: Path, capfd: pytest.C
 # --- documentation ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
-def test_help_has_all_that_pages_name() -> None:
-    """In an interpreter that has loaded nothing else, as ``help("rodfem.modes.modes")``."""
-    if not FIRST:
-        return
-    pages = ["README.md", "docs/running.md", "docs/rods.md", "rodfem/__init__.py"]
-    text = "".join((HOME / page).read_text() for page in pages)
-    named = {name for name in re.findall(r"\b(rodfem\.[a-zA-Z_.]*[a-zA-Z_])", text) if "XX" not in name}
-    paths = re.findall(r"`([a-z_0-9]+(?:/[a-z_0-9]+)+)\.py`", (HOME / "docs" / "architecture.md").read_text())
-    paths = [path.removeprefix("rodfem/") for path in paths if "tests" not in path]
-    named |= {"rodfem." + path.replace("/", ".") for path in paths}
-    assert {"rodfem.modes.modes", "rodfem.problem.contribution", "rodfem.fem.shape.link", "rodfem.forms.loads"} <= named
-    lines = ["import pydoc, rodfem"] + [f"pydoc.render_doc({name!r})" for name in sorted(named)]
-    environment = {"PATH": "/usr/bin:/bin", "PYTHONPATH": str(HOME), "HOME": str(Path.home())}
-    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, env=environment)
-    assert done.returncode == 0, done.stderr
-
-
 def test_the_spring_of_the_readme(capfd: pytest.CaptureFixture[str]) -> None:
     """It prints the stiffness that the page says, the same whatever the steps; by Kirchhoff's equations 2424.4 N/m."""
     block = re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), flags=re.DOTALL)[-1]
@@ -184,10 +164,3 @@ def test_a_log_of_a_long_run_has_lines_of_progress(monkeypatch: pytest.MonkeyPat
     rodfem.trace(scene, MESH, plan, Report(stream=log))
     assert [x for x in log.getvalue().splitlines() if not x.startswith("  ... ")] == plain.getvalue().splitlines()
     assert log.getvalue().count("\n  ... straight, 1 known, 0 branch points left to follow, lam = ") > 2
-
-
-def test_most_branches() -> None:
-    scene = hemitropic_cases.scene(span=(0.0, 0.5))
-    found = rodfem.trace(scene, MESH, Plan(most_branches=1, error_bars=False))
-    assert len(found) == 1 and sum(s.to_follow for s in found.special()) == 2
-    assert found.in_words().endswith("2 branch points were not followed.")

@@ -1,16 +1,13 @@
 """The program that judges a student's program."""
 
-import sys
 from math import pi
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 import check
 from lesson.answer import Answer
 from lesson.answers import answers
-from lesson.pictures import axes, show
 from rodfem.errors import InputError
 
 EULER = Answer("load", pi**2 / 4, "exact pi^2/4", 1e-4, "Look at the clamp.", ((pi**2, "Those are pinned ends."),))
@@ -78,14 +75,3 @@ def test_mistakes_and_questions(tmp_path: Path, capsys: pytest.CaptureFixture[st
         with pytest.raises(SystemExit):
             check.main(words)
         assert sentence in capsys.readouterr().err
-
-
-def test_a_notebook_displays_pictures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    shown: list[bytes] = []
-    stand_in = SimpleNamespace(Image=lambda png: png, display=shown.append)
-    monkeypatch.setitem(sys.modules, "ipykernel", SimpleNamespace())
-    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(display=stand_in, get_ipython=lambda: None))
-    monkeypatch.setitem(sys.modules, "IPython.display", stand_in)
-    monkeypatch.chdir(tmp_path)
-    show(axes("x", "y").figure, "empty")
-    assert shown[0].startswith(b"\x89PNG") and not list(tmp_path.iterdir())

@@ -12,7 +12,6 @@ from benchmarks.auto.problems import PROBLEMS
 from benchmarks.auto.program import check, require_auto
 from benchmarks.speed import plots
 from benchmarks.speed.scipy_bvp import RODS, solve
-from benchmarks.speed.tables import fastest
 from benchmarks.targets import TARGETS
 from rodfem.fem import system
 
@@ -37,17 +36,6 @@ def test_derivatives_given_to_auto(name: str) -> None:
     except AutoError as missing:
         pytest.skip(str(missing))
     assert max(check(PROBLEMS[name])) < 1e-8
-
-
-def test_an_error_that_is_small_by_chance_does_not_count() -> None:
-    errors = {4: 1e-9, 8: 1e-5, 12: 1e-7, 16: 1e-9}
-    rows = [
-        {"formulation": "reduced", "degree": 2, "elements": n, "values": {"a": 1.0}, "errors": {"a": e}, "seconds": n}
-        for n, e in errors.items()
-    ]
-    chosen = fastest(rows, 1e-6, lambda r: float(r["seconds"]))
-    assert chosen is not None and chosen["elements"] == 12
-    assert fastest(rows, 1e-10, lambda r: float(r["seconds"])) is None
 
 
 @pytest.mark.long

@@ -144,6 +144,9 @@ def test_modes(name: str, bad: Path) -> None:
     path = bad / "modes.h5"
     with h5py.File(path) as file:
         (row,) = file["branches/straight"]
+    assert "has no modes of row 999 of a branch 'straight': it has " in refused(
+        lambda: rodfem.load_modes(path, "straight", 999)
+    )
     spoil(path, put(f"branches/straight/{row}/{name}", h5py.SoftLink("/branches")))
     sentence = refused(lambda: rodfem.load_modes(path, "straight", int(row)))
     assert "modes.h5" in sentence and "\n" not in sentence

@@ -10,25 +10,21 @@ from rodfem.continuation.kinds import KINDS
 from rodfem.errors import InputError
 from rodfem.output.plot_diagram import MARKERS
 from rodfem.output.plot_frequencies import COLORS, PARTS
+from rodfem.output.plot_locus import LINES as LOCI
 from rodfem.output.plot_locus import POINTS
 from rodfem.output.style import LINES as STYLES
 from rodfem.output.table import COLUMNS, ENTRIES, NAMES, PAGE, REMARK, SPECIAL, explanation
 
-HOME = Path(__file__).parents[2]
+FILES = (Path(__file__).parents[2] / "docs" / "files.md").read_text()
 
 
 def test_every_word_has_an_entry() -> None:
     words = {*KINDS, *(entry.name for entry in (*COLUMNS, *SPECIAL[1:])), *MARKERS, *STYLES, *PARTS, *COLORS}
-    words |= {
-        "image, not traced",
-        "stable, as far as these curves tell",
-        "range of flutter",
-        "range of divergence",
-    }
+    words |= {"image, not traced", "stable, as far as these curves tell", "range of flutter", "range of divergence"}
     words |= {str(style["label"]) for style in POINTS.values()}
     words |= {kind.code for kind in KINDS.values()}
     headings = {"load", "ordinate", "int W ds", "index", "zero", "located to", "unstable"}  # of the terminal
-    columns = re.findall(r"^\| `(\w+)` \|.*", (HOME / "docs" / "files.md").read_text().split("### `branches[].col")[1])
+    columns = re.findall(r"^\| `(\w+)` \|.*", FILES.split("### `branches[].col")[1])
     for word in words | headings | set(columns):
         assert explanation(word), word
 
@@ -36,7 +32,13 @@ def test_every_word_has_an_entry() -> None:
 def test_the_page_of_files_has_the_table() -> None:
     rows = [line for line in PAGE.splitlines() if line.startswith("| `")]
     assert len(rows) == len(COLUMNS) + len(SPECIAL) + len(REMARK) > 40
-    assert [row for row in rows if row not in (HOME / "docs" / "files.md").read_text().splitlines()] == []
+    assert [row for row in rows if row not in FILES.splitlines()] == []
+
+
+def test_the_page_of_files_has_all_kinds() -> None:
+    rows = re.findall(r"^\| `kind` \| text \| \| (`branch point`, .*) \|$", FILES, flags=re.MULTILINE)
+    every, loci = (set(re.findall(r"`([a-z ]+)`", row)) for row in rows)
+    assert set(KINDS) <= every and set(LOCI) == loci
 
 
 def test_each_name_has_one_entry() -> None:

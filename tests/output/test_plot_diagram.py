@@ -16,14 +16,13 @@ from rodfem.output.plot_diagram import (
     SINGULAR,
     UNEXPLAINED,
     dense,
-    dense_rows,
     draw_branches,
     draw_diagram,
     drawn,
     figure_of,
 )
 from rodfem.output.plot_locus import draw_locus
-from rodfem.output.style import PALETTE, sheet
+from rodfem.output.style import PALETTE
 
 
 def branch(name: str, ordinate: list[float], negative: list[int], **more: Any) -> dict[str, Any]:
@@ -147,15 +146,6 @@ def test_what_is_stable_beside_loci_ends_at_the_next_one(folder: Path, monkeypat
     assert len(axes.texts) == 2 and starts.isdisjoint(tuple(text.xy) for text in axes.texts)  # no label on a mark
 
 
-def test_a_long_subtitle_stays_below_the_title() -> None:
-    figure, axes = sheet(
-        "by hand", "; ".join(["more than seventy letters of what a picture was computed with, and how accurately"] * 2)
-    )
-    figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
-    title, below = (text.get_window_extent() for text in (figure._suptitle, axes.title))  # type: ignore[attr-defined]
-    assert title.y0 > below.y1 and below.x0 > 0 and below.x1 < figure.bbox.x1
-
-
 # --- curves between rows
 
 
@@ -176,26 +166,6 @@ def test_long_steps_are_no_chords() -> None:
     chord = np.interp(height, branch["columns"]["ordinate"], branch["columns"]["load"])
     assert abs(load - exact).max() < 2e-3 < 6e-3 < abs(chord - exact).max()
     assert all(row in curve for row in np.column_stack([branch["columns"][x] for x in ("load", "ordinate")]))
-
-
-def test_an_ordinate_has_no_kink_at_its_greatest_value() -> None:
-    """A parabola of few rows, none at its top, is that parabola."""
-    branch = elastica(np.linspace(0.0, 0.7, 7))
-    s = branch["columns"]["arclength"]
-    branch["columns"]["ordinate"] = s * (0.55 - s)
-    found = dense_rows(branch, "ordinate")
-    places = np.concatenate([s[row] + np.arange(1, 8) / 8 * (s[row + 1] - s[row]) for row in found])
-    np.testing.assert_allclose(np.concatenate([x[:, 1] for x in found.values()]), places * (0.55 - places), atol=1e-12)
-
-
-def test_rows_close_to_each_other_and_corners_stay_as_they_are() -> None:
-    assert not dense_rows(elastica(np.linspace(0.0, 0.7, 200)), "ordinate")
-    assert dense_rows(elastica(np.linspace(0.0, 0.7, 5)), "ordinate")
-    zigzag = abs(np.linspace(-0.2, 0.2, 9))
-    corner = elastica(np.linspace(0.0, 0.7, 9))
-    corner["columns"]["ordinate"] = zigzag
-    values = np.concatenate([found[:, 1] for found in dense_rows(corner, "ordinate").values()])
-    assert values.min() >= -1e-12 and values.max() <= 0.2 + 1e-12
 
 
 def test_what_a_diagram_does_not_explain_is_marked() -> None:

@@ -10,12 +10,12 @@ import h5py
 import numpy as np
 import pytest
 import ufl
+from classics import ON_AXIS, push
 from matplotlib.image import imread
 
-from rodfem import Attachment, Inertia, InputError, Ordinate, Parameter, Scene, at, everywhere, integral
+from rodfem import Attachment, InputError, Scene, at, everywhere, integral
 from rodfem.file_format import STATES
 from rodfem.forms import loads
-from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import SIDES, Look, glyphs_of, profile_of, turn
 from rodfem.output.pieces import typical_state
 from rodfem.output.render import draw_shape_safely, read_state, view_of
@@ -32,27 +32,14 @@ STRAIGHT = {"s": S, "r": np.outer(S, E3), "q": np.tile([1.0, 0, 0, 0], (31, 1))}
 
 def column(*ends: Any, **more: Any) -> Scene:
     """A straight rod along e3 between these ends, under a load P."""
-    return Scene(
-        name="column", interval=(0.0, 1.0), rod="unshearable and inextensible",
-        energy=lambda v, k, c: bending_and_twist(k, (1.0, 2.0, 1.0)) + 0 * c.P * k[0], parameters={"P": Parameter(1.0)},
-        ends=ends or (clamped(), free()), ordinate=Ordinate("x", s=1.0, of=lambda r, q: r[0]), span=(0.0, 5.0),
-        load="P", inertia=Inertia(rho_A=lambda c: 1.0), **more,
-    )  # fmt: skip
-
-
-def push(c: Any) -> tuple[float, float, Any]:
-    return (0.0, 0.0, -c.P)
-
-
-def along_e3(c: Any) -> tuple[float, float, None]:
-    return (0.0, 0.0, None)
+    return classics.column("column", ends or (clamped(), free()), (0.0, 5.0), inertia=classics.BEAM, **more)
 
 
 ENDS = {
     "clamp": clamped(lambda c: (0.0, 0.0, 1.0 - c.P / 10), lambda c: (ufl.cos(c.P / 2), 0.0, 0.0, ufl.sin(c.P / 2))),
-    "slide": sliding(along_e3, force=push),
+    "slide": sliding(ON_AXIS, force=push),
     "hinge": hinged((0.0, 2.0, 0.0)),
-    "pin": pinned(along_e3, push),
+    "pin": pinned(ON_AXIS, push),
     "spring": elastic(lambda c: (10.0, 20.0, 0.0), lambda c: 3.0, force=push),
     "free": free(follower=push),
 }
@@ -97,7 +84,6 @@ def test_constraints_are_named(folder: Path) -> None:
 def test_foundation_is_a_row_of_springs(folder: Path) -> None:
     bed = column(potential=lambda x, c: loads.spring(x.r, (300.0, 300.0, 0.0)))
     found = foundation_of(bed, STRAIGHT | {"load": 4.0})
-    assert found is not None
     np.testing.assert_allclose(found[1], np.tile(np.diag([300.0, 300.0, 0.0]), (9, 1, 1)), atol=1e-3)
     state = read_state(saved(folder / "states.h5", bed), "straight", 0)
     assert [x.color for x in state.solids(Look(0.01, state.view()))].count(STEEL) == 9

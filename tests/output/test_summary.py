@@ -240,14 +240,6 @@ def test_states_that_have_one_energy_at_one_load_alone_coexist() -> None:
     assert coexist in said(ring, twisted, span=(0.0, 2.0)) and "coexist" not in said(ring, ring, span=(0.0, 2.0))
 
 
-def test_of_many_stable_branches_a_hundred_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All pairs of ten thousand, which a file may have, would take an hour."""
-    asked: list[Any] = []
-    monkeypatch.setattr("rodfem.output.summary._shared", lambda *pair: asked.append(pair))
-    said(*(branch(f"found {i}", [0.0, 2.0, 4.0], [0] * 3) for i in range(300)))
-    assert len(asked) == 100 * 99 // 2
-
-
 def test_many_branches_and_many_intervals_are_counted() -> None:
     unstable = [branch(f"branch {i}", [0.0, 4.0], [1, 1]) for i in range(9)]
     straight = branch("straight", [0.0, 4.0], [0, 0])
@@ -256,3 +248,11 @@ def test_many_branches_and_many_intervals_are_counted() -> None:
     turns = [special("fold", i, float(i), i % 2 == 0, i % 2, multiplicity=1) for i in range(1, 12)]
     winding = branch("straight", [float(i) for i in range(13)], [i % 2 for i in range(13)], special=turns)
     assert "then its stability changes" in said(winding, span=(0.0, 12.0))
+
+
+def test_of_many_stable_branches_a_hundred_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All pairs of ten thousand, which a file may have, would take an hour."""
+    asked: list[Any] = []
+    monkeypatch.setattr("rodfem.output.summary._shared", lambda *pair: asked.append(pair))
+    said(*(branch(f"found {i}", [0.0, 2.0, 4.0], [0] * 3) for i in range(300)))
+    assert len(asked) == 100 * 99 // 2
