@@ -22,9 +22,8 @@ from benchmarks.store import Store
 
 sys.path.append(str(ROOT / "tests"))
 
-from hard.accuracy import PROBLEMS, at
 from hard.case import Case, Measured, words
-from hard.cases import CASES
+from hard.cases import CASES, PROBLEMS, problem_at
 from hard.fuzz import worker
 
 from rodfem.errors import InputError
@@ -138,7 +137,7 @@ def asked(accuracy: float) -> list[dict[str, Any]]:
 def at_accuracy(accuracy: float) -> Iterator[dict[str, Any]]:
     """Verdict on each problem with a known solution, with the error over the accuracy, and what was said."""
     for name in PROBLEMS:
-        found = at(accuracy, name)
+        found = problem_at(accuracy, name)
         ratio = found.error if isfinite(found.error) else None
         yield {"name": name, "verdict": found.verdict, "ratio": ratio, "said": found.said, "why": found.wrong}
 

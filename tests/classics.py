@@ -365,25 +365,33 @@ def bathe() -> Scene:
     )  # fmt: skip
 
 
-def helix(curvature: float) -> Scene:
-    """A straight rod that clamps on a helix hold in one, of a torsion that is the load."""
+def helix(curvature: float, most: float = 6.0, strains: Vector = lambda c: (0.0, 1.0), **more: Any) -> Scene:
+    """A straight rod that clamps on a helix hold in one, of a torsion that is the load, with ``strains`` v2, v3."""
 
     def angle(c: Any) -> Any:
         return ufl.sqrt(c.k**2 + c.t**2)
 
     def position(c: Any) -> tuple[Any, ...]:
-        w = angle(c)
-        axial = c.t / w**2 * (1 - ufl.sin(w) / w)
-        return (c.k / w**2 * (1 - ufl.cos(w)), c.k * axial, ufl.sin(w) / w + c.t * axial)
+        w, (v2, v3) = angle(c), strains(c)
+        part = ufl.sin(w) / w
+        axial = (v2 * c.k + v3 * c.t) / w**2 * (1 - part)
+        return ((1 - ufl.cos(w)) / w**2 * (c.k * v3 - c.t * v2), axial * c.k + part * v2, axial * c.t + part * v3)
 
     def rotation(c: Any) -> tuple[Any, ...]:
         w = angle(c)
         return (ufl.cos(w / 2), 0.0, ufl.sin(w / 2) * c.k / w, ufl.sin(w / 2) * c.t / w)
 
+    constants = {"t": 0.0, "k": curvature, "B2": 1.0, "C": 0.6} | more.pop("constants", {})
     return column(
-        "helix", (clamped(), clamped(position, rotation)), (0.0, 6.0), load="t",
-        constants={"t": 0.0, "k": curvature, "B2": 1.0, "C": 0.6}, start=lambda s: circle(curvature * s),
+        "helix", (clamped(), clamped(position, rotation)), (0.0, most), load="t", constants=constants,
+        start=lambda s: circle(curvature * s), **more,
     )  # fmt: skip
+
+
+def helix_directors(s: np.ndarray, curvature: float, torsion: float) -> np.ndarray:
+    """Quaternions (m, 4) of the directors normal, binormal, tangent of a helix."""
+    w = hypot(curvature, torsion)
+    return np.stack([np.cos(w * s / 2), 0 * s, np.sin(w * s / 2) * curvature / w, np.sin(w * s / 2) * torsion / w], 1)
 
 
 def spring(curvature: float, torsion: float) -> Scene:

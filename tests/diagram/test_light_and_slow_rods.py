@@ -13,7 +13,7 @@ import classics
 import numpy as np
 import pytest
 from classics import column
-from hard.thrusts import THIN
+from hard.sweeps import THIN
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 

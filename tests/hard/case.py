@@ -145,3 +145,9 @@ def compare(found: Sequence[SpecialPoint], expected: Sequence[Change], said: tup
     if left:
         return Measured(inf, 1.0, said, f"{left} missed")
     return Measured(max(ratios, default=0.0), 1.0, said, ratios=tuple(ratios))
+
+
+def check(expected: Sequence[Change], scene: Scene, mesh: Discretization | None = None, **plan: Any) -> Measured:
+    """The special points of the first branch of a scene, with the index on either side, against those expected."""
+    diagram = run(scene, mesh, **plan)
+    return compare(singular(diagram[0]), expected, said(diagram))

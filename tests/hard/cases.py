@@ -1,26 +1,24 @@
-"""All hard cases, and for which values each is measured; their words are in ``cases.md``."""
+"""All hard cases, and for which values each is measured; their words are in ``cases.md``.
 
+Some are problems for an accuracy that is asked for, too: ``Plan(accuracy=...)``.
+"""
+
+from collections.abc import Callable
 from functools import partial
 
 from hard import (
     bifurcations,
-    classical,
     endurance,
     loci,
-    loci_codim2,
-    paths,
-    planes,
     published,
-    ranges,
     snapping,
-    springy_rings,
     stiffness,
-    thrusts,
-    uneven,
+    sweeps,
     writhing,
 )
-from hard.case import Case
+from hard.case import ASKED, Case, Measured, check
 from hard.stiffness import EULER
+from literature.test_classics import CRITICAL
 
 from rodfem import Discretization
 
@@ -38,9 +36,9 @@ STIFFNESS = (
     Case("degree", lambda p: stiffness.euler(Discretization("reduced", 4, p)), (1, 5, 12), tuple(range(1, 13))),
     Case("graded meshes", stiffness.graded, (1e-3, 1e-5), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)),
     Case("rotations past 2 pi and 4 pi", stiffness.turned, (2.0, 0.6), (4.0, 2.0, 1.2, 0.8, 0.6)),
-    Case("a stiffness that varies along the rod", uneven.stiffness, (3, 4), tuple(range(10))),
-    Case("a weight that varies along the rod", uneven.weight, (7,), tuple(range(10))),
-    Case("a foundation that varies along the rod", uneven.bed, (5,), tuple(range(10))),
+    Case("a stiffness that varies along the rod", stiffness.uneven_stiffness, (3, 4), tuple(range(10))),
+    Case("a weight that varies along the rod", stiffness.uneven_weight, (7,), tuple(range(10))),
+    Case("a foundation that varies along the rod", stiffness.uneven_bed, (5,), tuple(range(10))),
     Case(
         "an end nearly free to turn",
         stiffness.soft,
@@ -72,56 +70,64 @@ BIFURCATIONS = (
     Case("an isola", bifurcations.isola, (1e-2, 1e-6), (1e-1, 1e-2, 1e-4, 1e-6, 1e-7, 1e-8)),
     Case(
         "a range about a branch point",
-        lambda half: ranges.within(EULER - half, EULER + half),
+        lambda half: bifurcations.within(EULER - half, EULER + half),
         (1e-6, 1e-9),
         (1e-12, 1e-9, 1e-6, 1e-3, 1.0),
     ),
     Case(
         "the same, downwards",
-        lambda half: ranges.within(EULER + half, EULER - half),
+        lambda half: bifurcations.within(EULER + half, EULER - half),
         (1e-6, 1e-9),
         (1e-9, 1e-6, 1e-3, 1.0),
     ),
     Case(
         "a range between branch points",
-        lambda short: ranges.within(EULER + short, 2 * EULER - short),
+        lambda short: bifurcations.within(EULER + short, 2 * EULER - short),
         (1e-6,),
         (1e-6, 1e-3, 0.1),
     ),
-    Case("a range that ends just before a fold", ranges.turning, (1e-3, 0.5), (1e-3, 1e-2, 0.1, 0.5, 0.9, 1.5)),
+    Case("a range that ends just before a fold", bifurcations.turning, (1e-3, 0.5), (1e-3, 1e-2, 0.1, 0.5, 0.9, 1.5)),
     Case(
-        "a range that ends between two folds", partial(ranges.turning, height=ranges.LOW), (0.5,), (0.3, 0.5, 0.9, 1.5)
+        "a range that ends between two folds",
+        partial(bifurcations.turning, height=bifurcations.LOW),
+        (0.5,),
+        (0.3, 0.5, 0.9, 1.5),
     ),
-    Case("a load asked for at a branch point", ranges.asked, (0.0, -1e-9), (0.0, 1e-12, -1e-12, 1e-9, -1e-9)),
-    Case("two to four branch points in two planes, at random", planes.crossings, (70072, 93209), tuple(range(60))),
-    Case("two to five branch points in a cluster, at random", planes.cluster, (3,), tuple(range(100))),
+    Case("a load asked for at a branch point", bifurcations.asked, (0.0, -1e-9), (0.0, 1e-12, -1e-12, 1e-9, -1e-9)),
+    Case(
+        "two to four branch points in two planes, at random",
+        bifurcations.random_crossings,
+        (70072, 93209),
+        tuple(range(60)),
+    ),
+    Case("two to five branch points in a cluster, at random", bifurcations.random_cluster, (3,), tuple(range(100))),
 )
 ABOVE = (1e-2, 1e-4, -1e-4)
 """Greatest thrust of a sweep, less the critical one."""
 SWEEPS = (
-    Case("flutter of two planes", thrusts.two_planes, (1e-6, 1e-10), (2e-2, 1e-2, 1e-3, 1e-6, 1e-9, 1e-10)),
+    Case("flutter of two planes", sweeps.two_planes, (1e-6, 1e-10), (2e-2, 1e-2, 1e-3, 1e-6, 1e-9, 1e-10)),
     Case(
         "a flutter load that is asked for",
-        thrusts.asked,
+        sweeps.asked,
         (4e-13,),
         (0.0, 1e-14, -1e-14, 1e-13, -1e-13, 4e-13, -4e-13, 1e-11, -1e-11, 1e-9),
     ),
-    Case("flutter of a stiff rod on soft springs", thrusts.soft_springs, (1e-7,), (1e-5, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8)),
+    Case("flutter of a stiff rod on soft springs", sweeps.soft_springs, (1e-7,), (1e-5, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8)),
     *(
-        Case(f"{kind} that comes and goes{where}", partial(thrusts.pair, kind, at), few, ABOVE)
+        Case(f"{kind} that comes and goes{where}", partial(sweeps.pair, kind, at), few, ABOVE)
         for kind in ("flutter", "divergence")
-        for at, where, few in ((thrusts.BETWEEN, "", (1e-4,)), (thrusts.AT_ROW, ", at a row", (1e-2,)))
+        for at, where, few in ((sweeps.BETWEEN, "", (1e-4,)), (sweeps.AT_ROW, ", at a row", (1e-2,)))
     ),
     Case(
         "a fold of the path",
-        lambda given: paths.snapping(*given),
+        lambda given: sweeps.snapping(*given),
         ((3.0, 0.02),),
         ((3.0, 0.02), (3.0, 0.05), (4.0, 0.1), (5.0, 0.02), (5.0, 0.2), (8.0, 0.1)),
     ),
-    Case("an imperfect column", paths.bends, (1e-3, 1e-7), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)),
+    Case("an imperfect column", sweeps.bends, (1e-3, 1e-7), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)),
     Case(
         "a floating ring under loads that follow",
-        paths.floats,
+        sweeps.floats,
         ((1e-3, 8), (1e-1, 6)),
         tuple((waves, elements) for waves in (1e-1, 1e-2, 1e-3) for elements in (6, 8, 11)),
     ),
@@ -138,15 +144,15 @@ LOCI = (
     Case("a parameter that is an imperfection", loci.imperfect, (1e-2, 1e-8), tuple(10.0**-i for i in range(2, 12))),
     Case("flutter on a foundation", loci.founded, (1e5,), (1e2, 1e3, 1e4, 1e5, 1e6)),
     Case("a small closed locus", loci.island, (2e-2,), (0.2, 0.1, 0.05, 2e-2)),
-    Case("a cusp in wide bounds", loci_codim2.cusp, (1e2,), (1.0, 1e1, 1e2, 1e3, 1e4)),
-    Case("folds that pass a branch point", loci_codim2.passes, (0.0, 0.2), (0.0, 0.1, 0.2)),
-    Case("folds that end on two branch points at once", loci_codim2.end_on_ring, (1.6,), (1.6, 2.2, 2.5)),
-    Case("a stiffness followed over decades", loci_codim2.convex, (1e6,), (1e2, 1e3, 1e4, 1e5, 1e6)),
-    Case("a ring whose stiffness varies", loci_codim2.modulated, (0.0,), (0.0, 0.05, 0.1, 0.2)),
+    Case("a cusp in wide bounds", loci.cusp, (1e2,), (1.0, 1e1, 1e2, 1e3, 1e4)),
+    Case("folds that pass a branch point", loci.passes, (0.0, 0.2), (0.0, 0.1, 0.2)),
+    Case("folds that end on two branch points at once", loci.end_on_ring, (1.6,), (1.6, 2.2, 2.5)),
+    Case("a stiffness followed over decades", loci.convex, (1e6,), (1e2, 1e3, 1e4, 1e5, 1e6)),
+    Case("a ring whose stiffness varies", loci.modulated, (0.0,), (0.0, 0.05, 0.1, 0.2)),
 )
 
 PUBLISHED = (
-    Case("critical loads with closed forms", classical.critical, ("heavy", "greenhill"), classical.PROBLEMS),
+    Case("critical loads with closed forms", published.critical, ("heavy", "greenhill"), published.PROBLEMS),
     Case("helical springs between hinges", published.spring, (1e-3, -1e-3), (1e-1, 1e-3, 1e-5, -1e-5)),
     Case(
         "helical springs between clamps",
@@ -169,7 +175,7 @@ PUBLISHED = (
     Case("snapping strips, clamps turned oppositely", snapping.opposite, (0.9,), (0.95, 0.9, 0.8, 0.6)),
     Case("strips, clamps turned alike", snapping.alike, (0.6, 0.8), (0.95, 0.9, 0.8, 0.6)),
     Case("a hysteresis", snapping.hysteresis, (5.0,), (3.0, 5.0, 8.0)),
-    Case("pressed rings on springs that repeat n times", springy_rings.ring, (7, 4), (0, 3, 4, 5, 6, 7)),
+    Case("pressed rings on springs that repeat n times", published.springy_ring, (7, 4), (0, 3, 4, 5, 6, 7)),
     Case("a ring deployed by 4 pi", published.deployed_ring, (9.0,), (100.0, 9.0, 4.0)),
     Case("a planar elastica lost out of its plane", writhing.shortened, (1.0,), (1.25, 1.0, 0.75, 0.5)),
     Case(
@@ -203,3 +209,43 @@ CASES = {
     "published": PUBLISHED,
     "endurance": ENDURANCE,
 }
+
+# --- an accuracy asked for in place of a mesh ------------------------------------------------------------------------
+
+Problem = Callable[[], Measured]
+
+
+def critical(name: str) -> Measured:
+    """Critical loads of a classical problem."""
+    return check(published.changes(name), CRITICAL[name][0]())
+
+
+PROBLEMS: dict[str, Problem] = {
+    **{name: partial(critical, name) for name in published.PROBLEMS},
+    **{f"shear and stretch 1e{n} times": partial(stiffness.haringx, n) for n in (2, 4, 6)},
+    **{f"bending ratio {B2:g}": partial(stiffness.ratio, B2) for B2 in (10.0, 1e3)},
+    **{f"end turned, C = {C:g}": partial(stiffness.turned, C) for C in (2.0, 0.6)},
+    **{f"spring {part:g}": partial(published.spring, part) for part in (0.1, 1e-3)},
+    **{f"clamped spring {part:g}": partial(published.spring, part, "clamped-clamped") for part in (1e-2, -1e-4)},
+    **{f"{load} ring": partial(published.ring, load) for load in published.RINGS},
+    **{f"cord of {turns} turns": partial(published.cord, turns) for turns in (2, 10)},
+    "deep arch": partial(published.arch, 6),
+    **{f"strip {d:g}, {ratio:g}": partial(snapping.snapping, d, ratio) for d, ratio in ((0.9, 0.0), (0.6, 0.5))},
+    **{f"strip {d:g}, -1": partial(snapping.opposite, d) for d in (0.9, 0.6)},
+    **{f"strip {d:g}, 1": partial(snapping.alike, d) for d in (0.9, 0.6)},
+    **{f"hysteresis {P:g}": partial(snapping.hysteresis, P) for P in (3.0, 8.0)},
+    **{f"ring on {n} springs": partial(published.springy_ring, n) for n in (3, 4)},
+    **{f"elastica out of its plane, {C:g}": partial(writhing.shortened, C) for C in (1.25, 0.5)},
+    "writhing": partial(writhing.turned, 0.5, 1.0),
+    "heavy, curved": partial(writhing.heavy_shortened, 1.0, 20.0),
+    "heavy, curved, writhing": partial(writhing.heavy_turned, 0.4, 2.0, 50.0),
+}
+
+
+def problem_at(accuracy: float, name: str) -> Measured:
+    """Largest error of a problem over an ``accuracy`` that is asked for."""
+    before = ASKED.set(accuracy)
+    try:
+        return PROBLEMS[name]()
+    finally:
+        ASKED.reset(before)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import ufl
 from classics import BEAM, column
-from hard.case import Change, Measured, compare, reference, run, said, singular
+from hard.case import Change, Measured, check, compare, reference, run, said, singular
 
 from rodfem import Discretization, Ordinate, Scene, clamped, free
 from rodfem.forms.energy import bending_and_twist
@@ -54,8 +54,7 @@ def snapping(distance: float, ratio: float) -> Measured:
 
 def opposite(distance: float) -> Measured:
     """Ratio -1: the symmetric arch is lost at a pitchfork shortly before its fold."""
-    diagram = run(strip(distance, -1.0), MESH)
-    return compare(singular(diagram[0]), reference("strip", distance, -1.0), said(diagram))
+    return check(reference("strip", distance, -1.0), strip(distance, -1.0), MESH)
 
 
 def alike(distance: float) -> Measured:
@@ -87,5 +86,4 @@ def turning(load: float, share: float) -> Scene:
 
 def hysteresis(load: float) -> Measured:
     """Both folds, and the index on either side of each."""
-    diagram = run(turning(load, 0.0), MESH)
-    return compare(singular(diagram[0]), reference("hysteresis", load), said(diagram))
+    return check(reference("hysteresis", load), turning(load, 0.0), MESH)

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from hard import loci_codim2
+from hard import loci
 from hard.case import Case
 from hard.cases import CASES
 from hard.test_hard_cases import APART, value_of
@@ -20,5 +20,5 @@ def test_a_hard_locus(case: Case, value: Any) -> None:
 @pytest.mark.long
 def test_a_locus_of_a_point_that_the_mesh_does_not_resolve_says_so() -> None:
     """One of two eigenvalues that are one for the rod: its curve has another index."""
-    found = loci_codim2.modulated(0.15)
+    found = loci.modulated(0.15)
     assert COARSE in found.said

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import ufl
 from classics import column
-from hard.case import Measured, compare, reference, run, said, singular
+from hard.case import Measured, check, reference
 
 from rodfem import Discretization, Ordinate, Scene, clamped
 from rodfem.forms.energy import bending_and_twist
@@ -68,8 +68,7 @@ def heavy_rod(k0: float, w: float, load: str, D: float, span: tuple[float, float
 
 def changes(scene: Scene, elements: int, series: str, *values: float) -> Measured:
     """All folds and losses of stability of the first branch, with the index on either side."""
-    diagram = run(scene, Discretization("auto", elements, 6))
-    return compare(singular(diagram[0]), reference(series, *values), said(diagram))
+    return check(reference(series, *values), scene, Discretization("auto", elements, 6))
 
 
 def turned(D: float, C: float) -> Measured:

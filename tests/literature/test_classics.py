@@ -172,12 +172,6 @@ def test_bathe_and_bolourchi(formulation: str) -> None:
     assert r[[0, 2, 1]] == pytest.approx([15.68480053, 47.15043857, 53.47485879], rel=1e-9)
 
 
-def helix(s: np.ndarray, curvature: float, torsion: float) -> np.ndarray:
-    """Quaternions (m, 4) of the directors normal, binormal, tangent."""
-    w = np.hypot(curvature, torsion)
-    return np.stack([np.cos(w * s / 2), 0 * s, np.sin(w * s / 2) * curvature / w, np.sin(w * s / 2) * torsion / w], 1)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_helix_of_any_pitch(formulation: str) -> None:
@@ -186,7 +180,7 @@ def test_helix_of_any_pitch(formulation: str) -> None:
     found = explore(classics.helix(curvature), formulation, stops=stops)
     for t in stops:
         state = found.sample(0, t)
-        miss = state["q"] - helix(state["s"], curvature, t)
+        miss = state["q"] - classics.helix_directors(state["s"], curvature, t)
         force = np.array([0.0, curvature, t]) * t * (C - 1)
         n = np.array([[state[f"n{i}"] for i in (1, 2, 3)]]) if formulation == "reduced" else state["n"]
         assert abs(miss).max() < 1e-9
