@@ -16,14 +16,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
 from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FREQUENCY, KINDS
 from rodfem.modes.modes import RIGID
 from rodfem.output.pieces import Interval, intervals_of
-from rodfem.output.plot_diagram import dense
-from rodfem.output.style import HALO, PALETTE, STYLE, axis_label, explain, save, sheet
+from rodfem.output.style import PALETTE, STYLE, axis_label, explain, save, sheet
 from rodfem.output.words import mesh_in_words, rounded_up
 from rodfem.stability.soft_mode import STABLE
 
@@ -79,14 +77,11 @@ def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]]) -> list[Artist]
             ranges[found.words] = Patch(color=found.shade, label=found.words)
         for curve in curves(branch):
             shown |= _draw_curve(axes, curve, motions.setdefault(curve.motion, curve.colour))
-        shown |= _marked(axes, branch["special"])
-    looks: dict[str, dict[str, Any]] = {
-        **{what: {"color": "0.3", "marker": marker, "ls": line, "lw": 0.8} for what, (marker, line) in PARTS.items()},
-        **{kind: {"ls": "none", **marker} for kind, marker in SPECIAL.items()},
-    }
     lines = [Line2D([], [], color=color, lw=1.8, label=motion) for motion, color in motions.items()]
-    others = [Line2D([], [], **{"label": what} | look) for what, look in looks.items() if what in shown]
-    return [*lines, *others, *ranges.values()]
+    for what, (marker, line) in PARTS.items():
+        lines += [Line2D([], [], color="0.3", marker=marker, ls=line, lw=0.8, label=what)] * (what in shown)
+    marks = _marked(axes, [special for branch in branches for special in branch["special"]])
+    return [*lines, *marks, *ranges.values()]
 
 
 def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
@@ -98,33 +93,13 @@ def _draw_curve(axes: Axes, curve: FrequencyCurve, color: str) -> set[str]:
     return {*parts}
 
 
-def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> set[str]:
-    """Mark flutter and divergence loads with their values: of divergence above the axis, where its frequency is."""
-    found = [special for special in specials if special["kind"] in SPECIAL]
-    for special in found:
-        here = float(special["load"]), abs(complex(special["omega2"])) ** 0.5
-        axes.plot(*here, ls="none", zorder=5, clip_on=False, **SPECIAL[special["kind"]])
-        text = axes.annotate(f"{special['load']:.6g}", here, (0.0, 14.0), textcoords="offset points", ha="center")
-        text.set(path_effects=HALO, zorder=6)
-        if here[1]:
-            _move_aside(axes, text)
-    return {special["kind"] for special in found}
-
-
-def _move_aside(axes: Axes, text: Annotation) -> None:
-    """Move a text to the place to the right of its mark, or to the left, where it covers least of the curves."""
-    axes.get_xlim()  # before that the axes do not fit the curves
-    lines = [np.column_stack(np.broadcast_arrays(*line.get_data())).astype(float) for line in axes.lines]
-    whole = [places[np.isfinite(places).all(axis=1)] for places in lines]
-    curves = np.concatenate([dense(axes, places) for places in whole if len(places) > 1])
-
-    def covered(place: tuple[float, float]) -> int:
-        text.set(position=place, ha="left" if place[0] > 0 else "right")
-        box = text.get_window_extent()
-        return int(np.all((curves > box.min) & (curves < box.max), axis=1).sum())
-
-    beside = [(8.0, y) for y in (6.0, -18.0, 18.0, -30.0)]
-    covered(min([*beside, *((-x, y) for x, y in beside)], key=covered))
+def _marked(axes: Axes, specials: Sequence[Mapping[str, Any]]) -> Iterator[Line2D]:
+    """Mark flutter and divergence loads, with their values in the legend."""
+    for kind, look in SPECIAL.items():
+        if found := [special for special in specials if special["kind"] == kind]:
+            places = [(special["load"], abs(complex(special["omega2"])) ** 0.5) for special in found]
+            words = f"{kind} at {', '.join(f'{load:.6g}' for load, _ in places)}"
+            yield from axes.plot(*np.transpose(places), ls="none", zorder=5, clip_on=False, label=words, **look)
 
 
 # --- curves and ranges

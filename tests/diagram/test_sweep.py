@@ -14,7 +14,6 @@ from rodfem import Branch, Discretization, End, Ordinate, Plan, Scene, Solver, c
 from rodfem.app.terminal import Report
 from rodfem.errors import ConvergenceError
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.plot_diagram import dense
 from rodfem.output.plot_frequencies import curves, figure_of, ranges_of
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -70,11 +69,7 @@ def test_curves_go_on_where_they_cross(monkeypatch: pytest.MonkeyPatch) -> None:
     assert motions[strong] == {line.motion} == {"bending about d2"}
     assert len(line.loads) >= len(branch.points) - 1
     (axes,) = figure_of(data).axes
-    (text,) = axes.texts  # the load of flutter covers no curve: one of the strong plane is next to it
-    box = text.get_window_extent()
-    paths = [np.column_stack(np.broadcast_arrays(*line.get_data())) for line in axes.lines if len(line.get_xdata()) > 1]
-    drawn = np.concatenate([dense(axes, path[np.isfinite(path).all(axis=1)]) for path in paths])
-    assert not np.all((drawn > box.min) & (drawn < box.max), axis=1).any()
+    assert "flutter at 20.051" in {text.get_text() for text in axes.get_legend().get_texts()}
 
 
 @pytest.mark.long
