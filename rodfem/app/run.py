@@ -33,8 +33,8 @@ from rodfem.modes.modes import Modes, save_modes
 from rodfem.output.files import load_json, save_json, save_run
 from rodfem.output.pieces import typical_state
 from rodfem.problem.arguments import checked, function, path, yes_or_no
-from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
+from rodfem.problem.trials import asked_for
 from rodfem.ranks import on_first
 from rodfem.stability.assessment import Assessor, Verdict
 from rodfem.whole_files import locked, remove_earlier

@@ -10,8 +10,8 @@ from rodfem.errors import InputError
 from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
 from rodfem.problem.arguments import a, convert, each, interval, optional, real, reals, whole, yes_or_no
 from rodfem.problem.events import Event, Level
-from rodfem.problem.functions import asked_for
 from rodfem.problem.scene import Scene
+from rodfem.problem.trials import asked_for
 from rodfem.problem.validation import FLEXIBLE, check_load, round_off_of_strains
 from rodfem.stability import AUTO, METHODS, find
 

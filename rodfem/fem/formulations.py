@@ -11,7 +11,7 @@ import ufl
 from rodfem.errors import InputError
 from rodfem.forms import lagrangian
 from rodfem.forms.rotation import IDENTITY, turn, turn_change
-from rodfem.problem.functions import LETTERS, PLACES, needs_centreline
+from rodfem.problem.functions import LETTERS, PLACES
 from rodfem.problem.quaternions import of_vector, product
 from rodfem.problem.unknowns import UNIT, Block, Group, Motion, Unknown
 
@@ -220,7 +220,7 @@ class Reduced(Formulation):
 
     def refusal(self, scene: Scene) -> str:
         """What needs the centreline."""
-        reason = needs_centreline(scene)
+        reason = scene.needs_centreline
         return reason and f"has no centreline, and {reason} needs one"
 
     def blocks(self, degree: int) -> list[Block]:

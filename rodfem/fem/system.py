@@ -40,8 +40,9 @@ from rodfem.fem.symmetries import (
 )
 from rodfem.linalg.factorization import Sizes
 from rodfem.linalg.matrices import shared, times
-from rodfem.problem.functions import derived, floats
+from rodfem.problem.functions import derived
 from rodfem.problem.scene import Scene
+from rodfem.problem.trials import floats
 from rodfem.problem.units import own_units
 from rodfem.timing import Clock
 

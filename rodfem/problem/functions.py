@@ -7,10 +7,9 @@ function that returns one for the object, and under ``places`` the words for whe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import lru_cache, wraps
-from itertools import chain
 from logging import getLogger
 from math import sqrt
 from numbers import Real
@@ -49,10 +48,6 @@ MEANINGS = {
 
 class UnnamedError(SceneError):
     """What a function of a scene does wrong; :func:`guarded` puts the subject before its words."""
-
-
-class NoCentreline(SceneError):
-    """A function of a place asked for the centreline where there is none."""
 
 
 # --- what a function is for
@@ -238,27 +233,15 @@ class Placeless:
         return getattr(self._constants, name)
 
 
-def watched(c: Constants) -> tuple[Constants, set[str]]:
-    """Return the same constants, and the set of names that they will have been asked for."""
-    asked: set[str] = set()
-
-    class Watched(Constants):
-        def __getattribute__(self, name: str) -> Any:
-            asked.add(name)
-            return super().__getattribute__(name)
-
-    return Watched(**vars(c)), asked
-
-
 class CheckedPlace(SimpleNamespace):
     """A place; an attribute that it does not have is a :class:`SceneError`."""
 
     def __getattr__(self, name: str) -> Any:
-        """Say what a place has; raises :class:`NoCentreline` for the centreline of the reduced formulation."""
+        """Say what a place has."""
         if name.startswith("__"):
             raise AttributeError(name)
         if name in ("r", "dr") and "r" not in vars(self):
-            raise NoCentreline("Reduced formulations have no centreline: use Discretization(formulation='pointwise').")
+            raise SceneError("Reduced formulations have no centreline: use Discretization(formulation='pointwise').")
         has = "r, q, R, d1, d2, d3, s and length, and where it is the whole rod dr, v and k"
         raise UnnamedError(f"asks for {name!r} of a place: it has {has}.")
 
@@ -283,72 +266,8 @@ def places_at(
     numbers = ([float(unit * x) for x in values] for unit, values in zip(units, state, strict=True))
     q, r, v, k = (wrap(ufl.as_vector(values)) for values in numbers)
     R = rotation(q)
-    return place(q, R, s, r, length=length), place(q, R, s, r, dr=ufl.dot(R, v), v=v, k=k, length=length)
+    return place(q, R, s, r, length=length), place(q, R, s, r, dr=wrap(ufl.dot(R, v)), v=v, k=k, length=length)
 
 
 numbers_at = lru_cache(32)(places_at)
 """The same, made once: all functions of a scene are tried in the same states."""
-
-
-# --- what the functions of a scene depend on
-
-
-def functions_of_places(scene: Scene) -> Iterator[tuple[str, OfPlace, Place]]:
-    """Functions of a place in the equations, each with a place of the kind that it will be given, without numbers."""
-    point, rod = some_places(scene, wrap=ufl.variable)
-    for what, function, role in functions_of(scene):
-        if role.call == "f(x, c)":
-            yield what, function, rod if role.along else point
-
-
-def asked_for(scene: Scene) -> set[str]:
-    """Names of the constants that the equations of a scene ask for."""
-    c, asked = watched(scene.constants())
-    for _, function, role in functions_of(scene):
-        if role.call == "f(c)":
-            function(c)
-    for _, function, known in functions_of_places(scene):
-        function(known, c)
-    scene.energy(ufl.as_vector(UNDEFORMED), ufl.as_vector([0.0, 0.0, 0.0]), c)
-    return asked
-
-
-def asks_where(function: OfPlace, c: Constants) -> bool:
-    """Whether a function of a place depends on where the rod is."""
-    q = ufl.as_vector([ufl.as_ufl(x) for x in IDENTITY])
-    strains = {"v": ufl.as_vector(UNDEFORMED), "k": ufl.as_vector([0.0, 0.0, 0.0]), "length": 1.0}
-    try:
-        function(place(q, rotation(q), c.s, **strains), c)
-    except NoCentreline:
-        return True
-    return False
-
-
-def floats(scene: Scene) -> bool:
-    """Whether nothing holds the rod where it is: no end, no spring, no constraint."""
-    c = scene.constants()
-    if scene.closed or any(len(end.fixed(c)) for end in scene.sides):
-        return False
-    return not any(asks_where(function, c) for _, function, _ in functions_of_places(scene))
-
-
-def needs_centreline(scene: Scene) -> str:
-    """Say what in a scene needs the centreline as a field, in words; empty where nothing does."""
-    return next((what for what, needs in chain(_needs(scene), _asking(scene)) if needs), "")
-
-
-def _needs(scene: Scene) -> Iterator[tuple[str, bool]]:
-    attached = [x for x in scene.attachments if scene.is_inside(x.s)]
-    yield "the mass of a rod under a load without potential", not scene.conservative
-    yield "a distributed force", scene.distributed is not None
-    yield "what is attached along the rod", any(x.force or x.mass for x in attached)
-    yield "the mass of the rod", scene.inertia.rho_A(scene.constants()) != 0
-    floating = floats(scene) and not all(scene.plain)
-    yield "a rod that nothing holds, with more than dead forces at its ends,", floating
-
-
-def _asking(scene: Scene) -> Iterator[tuple[str, bool]]:
-    for owner in (*(part.of for part in scene.parts if part.s is None or scene.is_inside(part.s)), scene.ordinate):
-        for what, function, role in functions_of(owner, nested=False):
-            of_place = role.call in ("f(x, c)", "of(x, c)")
-            yield f"the {what}", of_place and asks_where(function, scene.constants())

@@ -35,12 +35,11 @@ from rodfem.problem.functions import (
     guarded,
     inside,
     role_field,
-    watched,
 )
 from rodfem.problem.table import Entry, Table
-from rodfem.problem.trials import check_function, expressions_of, symbols
+from rodfem.problem.trials import check_function, expressions_of, names_in, needs_centreline, symbols
 from rodfem.problem.units import Units, units_of
-from rodfem.problem.validation import check_scene
+from rodfem.problem.validation import check_scene, inertia_at
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
 
 GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
@@ -496,6 +495,11 @@ class Scene(Contribution, metaclass=Stated):
             values[self.load] = load
         return Constants(s=sum(self.interval) / 2 if s is None else s, **values)
 
+    @cached_property
+    def needs_centreline(self) -> str:
+        """What needs the centreline as a field, in words; empty where nothing does."""
+        return needs_centreline(self)
+
     # --- loads, inertia, units
 
     @cached_property
@@ -545,11 +549,8 @@ class Scene(Contribution, metaclass=Stated):
     @cached_property
     def inertia_depends_on_load(self) -> bool:
         """Whether a mass or a rotary inertia, along the rod or attached to it, is a function of the load."""
-        c, asked = watched(self.constants())
-        attached = (f for x in self.attachments for f in (x.mass, x.rotary_inertia) if f)
-        for function in (self.inertia.rho_A, self.inertia.others, *attached):
-            function(c)
-        return self.load in asked
+        first, *others = (inertia_at(self, load) for load in self.loads())
+        return any(other != first for other in others)
 
     @cached_property
     def units(self) -> Units:
@@ -560,9 +561,7 @@ class Scene(Contribution, metaclass=Stated):
 
     def energy_depends_on(self, *names: str) -> bool:
         """Whether the stored energy is a function of one of the parameters ``names``, or of the arclength ``s``."""
-        c, asked = watched(self.constants())
-        self.energy_at(np.zeros(3), np.zeros(3), c)
-        return bool(asked & set(names))
+        return not names_in(self, "W(v, k, c)").isdisjoint(f"c.{name}" for name in names)
 
     def energy_at(self, v: np.ndarray, k: np.ndarray, c: Constants) -> float:
         """Stored energy per length where the strains (3,) differ by ``v`` and ``k`` from the undeformed ones."""
@@ -573,17 +572,8 @@ class Scene(Contribution, metaclass=Stated):
     @cached_property
     def ignored_strains(self) -> tuple[int, ...]:
         """Components of ``v`` that the stored energy depends on, but that the kind of rod keeps undeformed."""
-        v, k = 0.05 * np.random.default_rng(1).uniform(0.5, 1, size=(2, 3))
-        free = np.where(np.isin(np.arange(3), self.free_strains), v, 0.0)
-
-        def felt(i: int, s: float) -> bool:
-            one, *others = (
-                self.energy_at(free + d * v[i] * np.eye(3)[i], k, self.constants(s=s)) for d in (0.0, -1.0, 1.0)
-            )
-            return any(abs(other - one) > NEGLIGIBLE * max(abs(one), abs(other)) for other in others)
-
-        places = self.samples() if self.energy_depends_on("s") else self.samples()[:1]
-        return tuple(i for i in range(3) if i not in self.free_strains and any(felt(i, s) for s in places))
+        names = names_in(self, "W(v, k, c)")
+        return tuple(i for i in range(3) if i not in self.free_strains and f"v[{i}]" in names)
 
     def stiffness(self, s: float | None = None) -> np.ndarray:
         """Second derivative of ``W`` in the m free strains and ``k`` at the undeformed state, (m + 3, m + 3)."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterator, Sized
 from dataclasses import dataclass
+from itertools import chain, product
 from math import inf, isfinite, isnan, nan
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ import numpy as np
 import ufl
 
 from rodfem.errors import SceneError
-from rodfem.expressions import Symbol, differentiated, evaluated
+from rodfem.expressions import Symbol, differentiated, evaluated, parts
 from rodfem.forms.kinematics import UNDEFORMED
 from rodfem.problem.arguments import check_scalar, check_vector, number_of, plain, takes
 from rodfem.problem.functions import (
@@ -35,7 +36,6 @@ from rodfem.problem.functions import (
     inside,
     places_at,
     some_places,
-    watched,
 )
 from rodfem.tolerances import NEGLIGIBLE
 
@@ -78,6 +78,50 @@ def expressions_of(scene: Scene) -> Iterator[Any]:
         yield from (e for e in trial.expressions[1] if e is not None)
 
 
+def names_in(scene: Scene, *calls: str) -> set[str]:
+    """Names of the constants and components of the state in what functions of a scene that are called so return."""
+    return {name for trial in _trials(scene) if trial.role.call in calls for name in trial.names}
+
+
+def asked_for(scene: Scene) -> set[str]:
+    """Names of the constants in the equations of a scene."""
+    names = names_in(scene, "f(c)", "f(x, c)", "W(v, k, c)")
+    return {name.removeprefix("c.") for name in names if name.startswith("c.")}
+
+
+def is_placed(scene: Scene) -> bool:
+    """Whether a function of a place, a spring or a constraint, depends on where the rod is."""
+    return any(trial.asks_where for trial in _trials(scene) if trial.role.call == "f(x, c)")
+
+
+def floats(scene: Scene) -> bool:
+    """Whether nothing holds the rod where it is: no end, no spring, no constraint."""
+    held = scene.closed or any(len(end.fixed(scene.constants())) for end in scene.sides)
+    return not (held or is_placed(scene))
+
+
+def needs_centreline(scene: Scene) -> str:
+    """Say what in a scene needs the centreline as a field, in words; empty where nothing does."""
+    return next((what for what, needs in chain(_needs(scene), _asking(scene)) if needs), "")
+
+
+def _needs(scene: Scene) -> Iterator[tuple[str, bool]]:
+    attached = [x for x in scene.attachments if scene.is_inside(x.s)]
+    yield "the mass of a rod under a load without potential", not scene.conservative
+    yield "a distributed force", scene.distributed is not None
+    yield "what is attached along the rod", any(x.force or x.mass for x in attached)
+    yield "the mass of the rod", scene.inertia.rho_A(scene.constants()) != 0
+    floating = floats(scene) and not all(scene.plain)
+    yield "a rod that nothing holds, with more than dead forces at its ends,", floating
+
+
+def _asking(scene: Scene) -> Iterator[tuple[str, bool]]:
+    for owner in (*(part.of for part in scene.parts if part.s is None or scene.is_inside(part.s)), scene.ordinate):
+        for what, function, role in functions_of(owner, nested=False):
+            of_place = role.call in ("f(x, c)", "of(x, c)")
+            yield f"the {what}", of_place and _Trial(scene, what, function, role, None).asks_where
+
+
 def _trials(scene: Scene) -> Iterator[_Trial]:
     for what, function, role in functions_of(scene):
         if role.call in OF_PLACES or (role.call == "f(c)" and role.size is not None):
@@ -106,6 +150,17 @@ class _Trial:
     def of_place(self) -> bool:
         """Whether it is a function of a place."""
         return self.role.call in OF_PLACES
+
+    @property
+    def names(self) -> set[str]:
+        """Names of the constants and components of the state that its expressions depend on: ``c.P``, ``x.r[0]``."""
+        every = (part for e in self.expressions[1] if e is not None for part in parts(e))
+        return {part.name for part in every if isinstance(part, Symbol)}
+
+    @property
+    def asks_where(self) -> bool:
+        """Whether it depends on where the rod is."""
+        return any(name.startswith(("x.r", "x.dr")) for name in self.names)
 
     def compare(self) -> None:
         """Raise :class:`SceneError` for a value of the expression that is not the one of the function of numbers."""
@@ -175,7 +230,8 @@ class _Trial:
         c = symbols(self.scene, None if self.s is None else self.scene.parameters)
         if self.s is not None:
             c.s = self.s
-        names = iter(("q", "r", "v", "k") if self.role.call == "W(v, k, c)" else ("x.q", "x.r", "x.v", "x.k"))
+        before = "" if self.role.call == "W(v, k, c)" else "x."
+        names = (f"{before}{name}" for name in ("q", "r", "v", "k", "dr"))
 
         def symbolic(vector: Any) -> Any:
             name, size = next(names), vector.ufl_shape[0]
@@ -234,15 +290,12 @@ def _check_ends(scene: Scene, normal: int, c: Constants) -> None:
 
 
 def _check_load(scene: Scene, what: str, function: Callable[..., Any], out: list[int]) -> None:
-    """Try a load, whose components ``out`` push out of the plane, at loads and arclengths, if it asks for them."""
-    c, asked = watched(scene.constants())
-    function(c)
-    for load in scene.loads() if scene.load in asked else [None]:
-        for s in scene.samples() if "s" in asked else [None]:
-            values = [float(x) for x in function(scene.constants(load, s))]
-            if any(values[i] for i in out):
-                where = f"its plane across {scene.planar}, with {values}"
-                raise SceneError(f"The {what} pushes the rod out of {where}: leave that component out, or planar.")
+    """Try a load, whose components ``out`` push out of the plane, at loads and arclengths."""
+    for load, s in product(scene.loads(), scene.samples()):
+        values = [float(x) for x in function(scene.constants(load, s))]
+        if any(values[i] for i in out):
+            where = f"its plane across {scene.planar}, with {values}"
+            raise SceneError(f"The {what} pushes the rod out of {where}: leave that component out, or planar.")
 
 
 def _check_functions_of_states(scene: Scene, normal: int) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 
 from rodfem.errors import SceneError
 from rodfem.problem.arguments import number_of
-from rodfem.problem.functions import PLACES, SIDES, STATES, asked_for, asks_where, floats, functions_of_places
-from rodfem.problem.trials import check_functions, check_plane, expressions_of
+from rodfem.problem.functions import PLACES, SIDES, STATES
+from rodfem.problem.trials import asked_for, check_functions, check_plane, expressions_of, floats, is_placed
 from rodfem.tolerances import NEGLIGIBLE
 
 if TYPE_CHECKING:
@@ -118,7 +118,7 @@ def check_start(scene: Scene) -> None:
 
 def trouble_with_inertia(scene: Scene, load: float | None) -> str:
     """Sentence on a mass or a rotary inertia that cannot be, at a ``load`` or the scene's own; empty for none."""
-    masses, rotary = _inertia_at(scene, load)
+    masses, rotary = inertia_at(scene, load)
     least, largest = min(masses + rotary), max(masses + rotary)
     there = "" if load is None else f" at {scene.load} = {load:g}"
     if least < 0:
@@ -133,7 +133,7 @@ def trouble_with_inertia(scene: Scene, load: float | None) -> str:
     )
 
 
-def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
+def inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
     """Masses and rotary inertias of a scene at a ``load``, by default its own: of the rod at its samples."""
     c, along = scene.constants(load), [scene.constants(load, s) for s in scene.samples()]
     masses = [float(x.mass(c)) for x in scene.attachments if x.mass]
@@ -200,7 +200,7 @@ def check_drift(scene: Scene) -> None:
     c = scene.constants()
     if floats(scene):
         check_balance(scene)
-    if scene.closed or any(asks_where(f, c) for _, f, _ in functions_of_places(scene)):
+    if scene.closed or is_placed(scene):
         return
     held = np.vstack([np.zeros(3), *(end.fixed(c) for end in scene.sides)])
     for i, direction in enumerate(np.eye(3) if held.any() else ()):

@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from rodfem import compat
 from rodfem.fem.system import System
 from rodfem.linalg.matrices import EPS, gathered, local_rows, rounding_of
-from rodfem.problem.functions import floats
+from rodfem.problem.trials import floats
 from rodfem.stability import motion_names
 from rodfem.stability.inertia import NOISE
 from rodfem.stability.pencil import PencilMatrices, assemble_pencil, exclude_modes, in_units, symmetry_modes

@@ -20,7 +20,6 @@ from shooting_solver import Problem, Rod
 
 from rodfem import Branch, Discretization, Plan, Scene, trace
 from rodfem.app.terminal import Report
-from rodfem.problem.functions import needs_centreline
 
 PAGE = Path(__file__).parents[2] / "docs" / "rods.md"
 
@@ -70,7 +69,7 @@ def test_every_scene_of_the_page() -> None:
     found = list(scenes().values())
     assert len(found) > 20
     assert {s.name for s in found if not s.conservative} == {"pflueger", "leipholz"}
-    assert {s.name for s in found if needs_centreline(s)} >= {"heavy", "foundation", "midway", "pflueger", "leipholz"}
+    assert {s.name for s in found if s.needs_centreline} >= {"heavy", "foundation", "midway", "pflueger", "leipholz"}
 
 
 @cache
