@@ -280,7 +280,7 @@ def _stability(row: Data) -> Words:
         sentence = f"Stability undecided: {on_kink(row['kink'])}; {side}."
         return Words(UNDECIDED, index_range(negative, undecided, row["kink"]), sentence)
     if "omega2" in row:
-        return _of_rates(negative, row["omega2"]) if row.get("rates") else _of_frequencies(negative, row["omega2"])
+        return _of_frequencies(negative, row["omega2"], rates=bool(row.get("rates")))
     verdict = VERDICTS.get(stability(negative, undecided, in_space=space), UNSTABLE)
     index = index_range(negative, undecided) + ("" if space is None or undecided else f" ({space})")
     zero = row["zero"]
@@ -304,20 +304,12 @@ def _open(undecided: int) -> str:
     return f"{many(undecided, 'eigenvalue')} whose sign is not known on this mesh"
 
 
-def _of_rates(negative: int, found: Sequence[Sequence[float]]) -> Words:
-    """The same by rates of decay."""
+def _of_frequencies(negative: int, values: Sequence[Sequence[float]], *, rates: bool) -> Words:
+    """Words for a state by its squared frequencies, or ``rates`` of decay, those found."""
+    found = f"of the {len(values)} {'rates of decay' if rates else 'values ω²'} found"
     if not negative:
-        return Words(STABLE, "0", f"Stable: all of the {len(found)} motions found decay.")
-    growing = sum(1 for real, imaginary in found if real < 0.0 and imaginary)
-    return Words(UNSTABLE, str(negative), f"Unstable: {many(negative, 'motion')} grow, {growing} by oscillations.")
-
-
-def _of_frequencies(negative: int, omega2: Sequence[Sequence[float]]) -> Words:
-    """Words for a state under loads without potential, by its squared frequencies, those found."""
-    found = f"of the {len(omega2)} values ω² found"
-    if not negative:
-        return Words(STABLE, "0", f"Stable: none {found} is negative or complex.")
-    growing = sum(1 for value in omega2 if value[1])
+        return Words(STABLE, "0", f"Stable: none {found} is negative{'' if rates else ' or complex'}.")
+    growing = sum(1 for real, imaginary in values if imaginary and (real < 0.0 or not rates))
     kinds = [f"{growing} complex (flutter)"] if growing else []
     kinds += [f"{negative - growing} negative (divergence)"] if negative > growing else []
     return Words(UNSTABLE, str(negative), f"Unstable: {found}, {' and '.join(kinds)}.")

@@ -1,8 +1,7 @@
 r"""Supports and loads of a rod: derived from a scene, and written to a file.
 
 A potential of an end is a *spring* in translation (in rotation) where its second derivative at the reference is
-positive semidefinite and not zero.  Minus its derivative at the state is a load where it is none, and where it is one
-in the directions in which the position moves without stiffness: along a stiff one it is an anchor elsewhere.
+positive semidefinite and not zero.  Minus its derivative at the state is a load where it is none.
 """
 
 from __future__ import annotations
@@ -26,8 +25,6 @@ from rodfem.problem.setting import CONSTRAINTS, DISTRIBUTED, FOUNDATION, HELD, S
 Floats = NDArray[np.float64]
 Sample = dict[str, Any]
 CHANGING = ("frame", "force", "moment", "follower", "follower_moment")  # what changes with the state of a support
-FLAT = 1e-3
-"""Curvature times the rod's length, or difference of two curvatures relative to them, that is taken for zero."""
 
 
 def supports_of(scene: Scene, sample: Sample, first: dict[str, Support] | None = None) -> dict[str, Support]:
@@ -50,7 +47,7 @@ def _support(scene: Scene, sample: Sample, where: tuple[float, End, Any], first:
     if end.energy is not None:
         r, q = _state(sample, s)
         springs = springs if first else _springs(derivative_of(end.energy, c, _point(scene, s, r, frame), 2))
-        loads = _load_of(end.energy, c, _point(scene, s, r, q), springs)
+        loads = -derivative_of(end.energy, c, _point(scene, s, r, q)) * ~springs.any(axis=(1, 2))[:, None]
         loads[1] *= end.turning != HELD
     if end.rotation is not None:
         frame = np.array([number_of(x) for x in end.frame(c)])
@@ -105,18 +102,6 @@ def _springs(second: Floats) -> Floats:
     """Second derivatives (n, 3, 3) that are those of springs, zero for what is not positive semidefinite."""
     least, greatest = np.linalg.eigvalsh(second)[:, 0], abs(second).max(axis=(1, 2))
     return second * (least > -0.1 * greatest)[:, None, None]
-
-
-def _load_of(energy: OfPlace, c: Constants, x: Place, springs: Floats) -> Floats:
-    """Force and moment (2, 3) of a potential at a place ``x``, in the frame of space, where it is no spring's."""
-    out = -derivative_of(energy, c, x)
-    if springs[0].any():
-        values, axes = np.linalg.eigh(springs[0])
-        loose = axes[:, values < FLAT * values.max()]
-        across = loose @ loose.T @ out[0]
-        out[0] = across * bool(np.linalg.norm(across) > FLAT * np.linalg.norm(out[0]))
-    out[1] *= not springs[1].any()
-    return out
 
 
 def distributed_on(scene: Scene, load: float) -> tuple[Floats, Floats, Floats]:

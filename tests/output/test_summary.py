@@ -230,6 +230,19 @@ def test_undecided_stability_is_no_stability() -> None:
     assert "of undecided stability" in said(first, side) and "unstable on its whole range" not in said(first, side)
 
 
+def test_a_load_asked_for_that_is_critical() -> None:
+    """Its own state is undecided, on both branches, which says nothing of the states next to it."""
+    at = pi**2 / 4
+    columns = {"undecided": [0, 0, 1, 0], "arclength": [0.0, 1.0, 1.0 + 1e-12, 2.0]}
+    point = special("branch point", 1, at, 0, 1, located_to=1e-11)
+    trunk = branch("straight", [1.0, at, at + 1e-12, 4.0], [0, 0, 0, 1], special=[point], columns=columns)
+    columns = {"undecided": [0, 1, 0], "arclength": [0.0, 1e-12, 1.0]}
+    side = branch("branch 1", [at, at + 1e-12, 4.0], [0, 0, 0], parent=["straight", 0], columns=columns)
+    words = said(trunk, side)
+    assert "then unstable (index 1) to 4." in words
+    assert "Branch 1, which leaves straight at 2.4674, is stable on its whole range" in words
+
+
 def test_states_that_have_one_energy_at_one_load_alone_coexist() -> None:
     """As a ring twisted by none and by two turns does, where its natural state is twisted by one."""
     loads, turns = [0.0, 0.5, 1.0, 1.5, 2.0], (0.0, 2.0)
