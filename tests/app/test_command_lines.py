@@ -5,6 +5,7 @@ import runpy
 import shlex
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hemitropic_cases import run_demo
@@ -97,14 +98,7 @@ def test_bad_lines(line: str, folder: Path, monkeypatch: pytest.MonkeyPatch, cap
         ("follower", "--formulation reduced", "use --formulation pointwise"),
     ],
 )
-def test_other_demos(
-    program: str,
-    line: str,
-    words: str,
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_other_demos(program: str, line: str, words: str, folder: Path, monkeypatch: Any, capfd: Any) -> None:
     path = str(HOME / "demos" / f"{program}.py")
     monkeypatch.setattr(sys, "argv", [path, *shlex.split(line)])
     monkeypatch.chdir(folder)

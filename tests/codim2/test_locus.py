@@ -11,9 +11,8 @@ import closed_form_hemitropic
 import numpy as np
 import pytest
 import ufl
-from closed_forms import double
+from closed_forms import flutter
 from demo_cases import explored as demo
-from demo_cases import scene as demo_scene
 from demo_cases import start_of_rod
 from hard.two_freedoms import scene as two_freedoms
 from hemitropic_cases import explored, follower, specials
@@ -21,14 +20,13 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from shooting_solver import Problem, Rod
 
-from rodfem import Branch, Discretization, InputError, Locus, Plan, SpecialPoint, StepControl, run, trace
+from rodfem import Discretization, InputError, Locus, Plan, SpecialPoint, StepControl, run, trace
 from rodfem.codim2.follow import STEPS, locus
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.plot_locus import _subtitle, draw_locus, stable_region
+from rodfem.output.plot_locus import _subtitle, draw_locus
 from rodfem.problem.ends import pinned
-from rodfem.problem.scene import Ordinate, Scene
+from rodfem.problem.scene import Ordinate
 from rodfem.report.branches import loci_of
 
 PLANE = ((0.01, 0.9), (-3.1, 1.0))
@@ -123,25 +121,18 @@ def test_each_special_point_has_its_locus_where_loads_are_small(tmp_path: Path) 
 
 
 @pytest.mark.long
-def test_flutter_against_rotary_inertia(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flutter_of_a_rod_that_bends_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two pairs of frequencies meet at once: where each does in its plane, down to where the double one vanishes."""
     monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 6)
-    rod = demo_scene("follower", span=(19.0, 21.0))
-    solver, branch = swept(rod)
-    (flutter,) = specials(branch, "flutter")
-    found = locus(solver, flutter, "J1", ((18.0, 22.0), (0.0, 0.004)), steps=WIDE, error_bars=2)
-    assert found.ended == ("J1 = 0, its bound", "J1 = 0.004, its bound")
-    for (P, J), mu in zip(found.values, found.omega2, strict=True):
-        assert [P, mu] == pytest.approx(double(P, mu, J).tolist(), rel=3e-11)
-    assert found.lower == -1 and (found.index == [0, 2]).all() and not found.marks
-    region = stable_region(found.data(), [found.data()])
-    assert region and (region.end == 18.0).all() and region.edge[[0, -1]] == pytest.approx(found.values[[0, -1], 0])
-    assert abs(found.values[-1, 0] - double(20.0, 120.0, 0.004)[0]) <= 10 * found.error[-1].max() <= 1e-9
-
-
-def swept(scene: Scene) -> tuple[BranchSolver, Branch]:
-    """Frequencies over the range of a scene, and what computed them."""
-    diagram = trace(scene, Discretization("pointwise", 4, 6), Plan(error_bars=False))
-    return diagram.solvers[0], diagram[0]
+    scene, mesh = classics.partly_following(1.0, (15.0, 25.0), strong=1.0), Discretization("pointwise", 4, 6)
+    diagram = trace(scene, mesh, Plan(error_bars=False))
+    found = locus(diagram.solvers[0], diagram.special("flutter")[0], "share", ((15.0, 25.0), (0.0, 1.0)), error_bars=3)
+    assert found.ended[0].startswith("the double eigenvalue vanishes: divergence near P = 17.06957")
+    for (P, share), mu in list(zip(found.values, found.omega2, strict=True))[4::4]:
+        assert flutter(P + 0.01, mu + 0.1, share=share) == pytest.approx((P, mu), rel=1e-9, abs=1e-7)
+    assert np.nanmax(found.error[1:]) < 1e-9 and (found.error[0] < 1e-7).all()
+    assert np.all(abs(found.values[0] - [17.0695747744975, 0.3543133021536]) <= found.error[0])
+    assert found.index.tolist() == [[0, 4]] * len(found.values)
 
 
 def test_errors_that_are_not_known_are_said_to_be_so() -> None:

@@ -4,11 +4,9 @@ from dataclasses import replace
 from math import cos, pi, sin, sqrt
 
 import golden_cases
-import hemitropic_cases
 import numpy as np
 import pytest
 from classics import ON_AXIS, column, explore, push
-from closed_form_hemitropic import loads as buckling_loads
 
 from rodfem import Discretization, Ordinate, Plan, Scene, StepControl, clamped, free, pinned, sliding, trace
 from rodfem.continuation.branch import breaks
@@ -50,22 +48,6 @@ def test_bars_of_a_double_point_hold_for_both_loads() -> None:
     assert special.multiplicity == 2 and special.resolved
     assert [abs(special.point.load - load) <= special.error_estimate for load in (EULER, EULER + apart)] == [True, True]
     assert special.error_estimate < 2 * apart
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize(("low", "high", "largest"), [
-    (0.2950, 0.4990121, 0.1), (0.4946, 0.6990, 0.3), (0.4910, 0.5050, 0.3),  # the last row, the first, the only step
-])  # fmt: skip
-def test_a_pair_of_crossings_beside_an_end_of_a_range(low: float, high: float, largest: float) -> None:
-    """The first row of a range has no row before it, and the last none after it."""
-    constants = (0.554629, 1.0, 1.0, 2.851609)
-    expected = [load for load in buckling_loads(*constants) if low < load < high]
-    plan = Plan((low, high), depth=0, steps=StepControl(largest=largest), error_bars=False)
-    (straight,) = trace(hemitropic_cases.scene(constants), Discretization("reduced", 16, 6), plan)
-    found = [s for s in straight.special if s.kind == BRANCH_POINT]
-    assert [s.point.load for s in found] == pytest.approx(expected, abs=1e-9)
-    assert [(s.negative_before, s.negative_after) for s in found[-2:]] == [(2, 4), (4, 2)]
-    assert not straight.unexplained
 
 
 def test_what_is_not_explained_is_kept() -> None:

@@ -63,18 +63,6 @@ def polynomial(*coefficients: np.ndarray) -> tuple[Node, Node]:
     return Node(0.0, A[0], A[1], 2), Node(1.0, sum(A[1:], A[0]), slope, 2)
 
 
-def test_crossings_and_their_indices() -> None:
-    """One up at 0.3 and one down there: the index stays; a double one at 0.6; none where all is definite."""
-    opposite = polynomial(np.diag([-0.3, 0.3]), np.diag([1.0, -1.0]))
-    (found,) = Zeros(lambda *_: None, 1e-9).crossings(*opposite, np.zeros((2, 2)))
-    assert (round(found.s, 9), found.before, found.after, found.vectors.shape) == (0.3, 3, 3, (2, 2))
-    double = polynomial(np.diag([0.6, 0.6, 1.0]), np.diag([-1.0, -1.0, 0.5]))
-    (found,) = Zeros(lambda *_: None, 1e-9).crossings(*double, np.zeros((3, 3)))
-    assert (round(found.s, 9), found.before, found.after, found.vectors.shape) == (0.6, 2, 4, (3, 2))
-    clear = polynomial(np.diag([1.0, -2.0]), np.diag([3.0, -1.0]))
-    assert Zeros(lambda *_: None, 1e-9).crossings(*clear, np.zeros((2, 2))) == []
-
-
 def test_a_pair_within_a_step_asks_for_one_state_between() -> None:
     """``(t - 0.5)^2 - d^2`` has its zeros in two halves then, which one state tells from ``(t - 0.5)^2 + d^2``."""
     for sign in (-1.0, 1.0):

@@ -7,38 +7,12 @@ from typing import Any
 import pytest
 from classics import euler
 from golden_cases import cases
-from rows import regular
 
-from rodfem import Discretization, Plan, StepControl, trace
+from rodfem import Discretization, Plan, trace
 from rodfem.continuation.branch_solver import BranchSolver, Step
-from rodfem.continuation.follow import UNEXPLAINED, defect
 
 SMALL = 1e-6
 """Size of the mutations, in the units of a rod of unit length and stiffness."""
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("steps", [StepControl(largest=0.1), StepControl(largest=0.2, aim=1e-2)], ids=["short", "long"])
-def test_a_row_of_another_branch_has_a_defect(steps: StepControl) -> None:
-    """States of another branch at nearly the same load, farther than a step away, in place of the last row.
-
-    By the tangents of four rows those of the branch itself have next to none with short steps.
-    """
-    diagram = trace(
-        cases()["demo hemitropic"](), Discretization("auto", 8, 6), Plan(depth=1, error_bars=False, steps=steps)
-    )
-    system, most, told = diagram.solvers[0].system, UNEXPLAINED * steps.aim, list[bool]()
-    own = list(map(regular, diagram.branches))
-    for branch in own:
-        for i in range(2, len(branch)):
-            assert defect(system, branch[max(i - 3, 0) : i + 1]) <= most * (0.1 if steps.largest < 0.2 else 1.0)
-            last, length = branch[i], branch[i].arclength - branch[i - 1].arclength
-            for other in (b for b in own if b is not branch):
-                near = min(other, key=lambda p: abs(p.load - last.load))
-                if abs(near.load - last.load) < 0.5 * length and system.distance(near.x, last.x) > length:
-                    jump = replace(near, arclength=last.arclength)
-                    told.append(defect(system, [*branch[max(i - 3, 0) : i], jump]) > most)
-    assert len(told) > 30 and all(told)
 
 
 def test_a_step_that_has_jumped_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,25 +12,13 @@ from closed_forms import elastica
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import ellipk, ellipkinc
 
-from rodfem import (
-    Attachment,
-    Discretization,
-    Ordinate,
-    Plan,
-    Scene,
-    Solver,
-    StepControl,
-    clamped,
-    free,
-    pinned,
-    sliding,
-    trace,
-)
+from rodfem import Attachment, Discretization, Ordinate, Plan, Scene, Solver, StepControl, trace
 from rodfem.continuation.branch import SpecialPoint
 from rodfem.continuation.kinds import BRANCH_POINT, FOLD, IMPERFECT
 from rodfem.continuation.singular import SingularSystem
 from rodfem.continuation.singular_points import COUPLED
 from rodfem.forms.energy import bending_and_twist
+from rodfem.problem.ends import clamped, free, pinned, sliding
 
 EULER = pi**2 / 4
 

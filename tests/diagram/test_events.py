@@ -81,20 +81,6 @@ def straight(
 
 
 @pytest.mark.few(1)
-@pytest.mark.parametrize("gap", [1.0, 0.02, 1e-3, 1e-5])
-def test_two_zeros_near_each_other(gap: float) -> None:
-    """Each is found and resolved, both where one step has the two and where the richer mesh has both within reach."""
-    exact = 2.5, 2.5 + gap
-    a, b = (1 - P / 50 for P in exact)
-    found = straight(lambda z: 1e4 * (z - a) * (z - b))
-    events = found.special("event")
-    assert [s.point.load for s in events] == pytest.approx(exact, rel=0, abs=1e-9)
-    assert all(abs(s.point.load - P) <= s.error_estimate < 1e-9 for s, P in zip(events, exact, strict=True))
-    assert all(s.resolved for s in events)
-    assert not found.warnings
-
-
-@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("of", "exact"),
     [

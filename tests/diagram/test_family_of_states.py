@@ -124,13 +124,6 @@ def half_turn(ends: Any) -> Diagram:
 
 
 @pytest.mark.ranks
-def test_a_closed_strip_may_slide_between_its_clamps() -> None:
-    """Any place of it may be the clamped one: no symmetry of the scene, as the clamps stay where they are."""
-    found = half_turn((clamped(), clamped(rotation=(0.0, 0.0, 0.0, -1.0))))
-    assert "1 eigenvalue stays zero that no symmetry of the scene explains (rotation about e3 with" in found.notes[0]
-
-
-@pytest.mark.ranks
 def test_a_ring_with_half_a_turn_slides_along_itself() -> None:
     """Its section looks alike after half a turn: rotations and that motion are its four zero eigenvalues."""
     found = half_turn(Ring(turn=pi))

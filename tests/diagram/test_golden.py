@@ -5,27 +5,16 @@ The record guards the numbers while the code changes its shape.  It is no oracle
 
 from typing import Any
 
+import golden_cases as golden
 import pytest
 from every_row import disagreements
-from golden_cases import (
-    DEMOS,
-    FAMILIES,
-    NOT_CONSERVATIVE,
-    REPEATED,
-    VARIED,
-    cases,
-    distinct,
-    numbers,
-    recorded,
-    single_branches,
-    trace,
-)
+from golden_cases import DEMOS, FAMILIES, NOT_CONSERVATIVE, REPEATED, VARIED, cases, single_branches
 from literature.test_classics import CRITICAL
 from mpi4py import MPI
 from work import counted, size
 from work import recorded as recorded_work
 
-NUMBERS = numbers()
+NUMBERS = golden.numbers()
 NOISE = 1.05
 """Factor by which work may differ where libraries and processors round differently."""
 
@@ -35,8 +24,8 @@ def test_all_cases_are_recorded() -> None:
     scenes = {name: scene() for name, scene in cases().items()}
     assert {name for name, scene in scenes.items() if not scene.conservative} == set(NOT_CONSERVATIVE)
     families = {name for name, scene in scenes.items() if scene.name in FAMILIES}
-    assert {case.values[0] for case in single_branches()} == set(distinct()) - families - set(NOT_CONSERVATIVE)
-    assert len(distinct()) == len(scenes) - len(REPEATED)
+    assert {case.values[0] for case in single_branches()} == set(golden.distinct()) - families - set(NOT_CONSERVATIVE)
+    assert len(golden.distinct()) == len(scenes) - len(REPEATED)
 
 
 def marked(name: str) -> Any:
@@ -59,8 +48,8 @@ def test_nothing_has_changed(name: str) -> None:
     Nor does it cost more: counts of work are compared on one rank, and may only fall.
     """
     with counted() as work:
-        diagram = trace(cases()[name](), error_bars=name in VARIED)
-    found, known = recorded(diagram), NUMBERS[name]
+        diagram = golden.trace(cases()[name](), error_bars=name in VARIED)
+    found, known = golden.recorded(diagram), NUMBERS[name]
     for key in ("name", "ended", "indices"):
         assert [b[key] for b in found] == [b[key] for b in known]
     for branch, old in zip(found, known, strict=True):

@@ -69,21 +69,6 @@ def test_diagram_of_a_scene_of_its_own(case: str) -> None:
     same(first, first.again())
 
 
-def test_solvers_that_share_forms_take_turns() -> None:
-    """Energies, and what dolfinx evaluates, are those of the constants of each state."""
-    one = Solver(hemitropic(), MESH)
-    other, alone = one.rebind(A=-1.5), Solver(hemitropic(-1.5), MESH)
-    points = [solver.equilibrium(0.3) for solver in (one, other, alone)]
-    forces = [s.equilibria.resultants.at(p.x)["moment"] for s, p in zip((one, other, alone), points, strict=True)]
-    np.testing.assert_array_equal(forces[1], forces[2])
-    at = [s.equilibria.system.at for s in (one, other, alone)]
-    assert at[0](points[0].x).energies() != at[1](points[1].x).energies()
-    at[0](points[0].x).energy()
-    again = other.equilibria.resultants.at(points[1].x)["moment"]  # its values were there, and its constants are not
-    np.testing.assert_array_equal(again, forces[2])
-    assert at[1](points[1].x).energies() == at[2](points[2].x).energies()
-
-
 def test_a_constant_that_asks_for_other_unknowns() -> None:
     """A rod with a mass has a centreline: nothing of the massless one is taken over."""
     rod = column("light", SUPPORTS["clamped-free"], (0.0, 4.0), inertia=Inertia(lambda c: c.k))

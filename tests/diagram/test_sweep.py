@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from closed_forms import column, flutter
 from hemitropic_cases import specials
-from scipy.optimize import brentq
 
-from rodfem import Branch, Discretization, End, Ordinate, Plan, Scene, Solver, compat, free, trace
+from rodfem import Branch, Discretization, Scene, Solver, compat, trace
 from rodfem.app.terminal import Report
 from rodfem.errors import ConvergenceError
-from rodfem.forms.energy import bending_and_twist
 from rodfem.output.plot_frequencies import curves, figure_of, ranges_of
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -86,34 +84,6 @@ def test_ranges_of_one_kind_of_instability(monkeypatch: pytest.MonkeyPatch) -> N
     found = list(ranges_of(data["branches"][0]))
     assert [r.words for r in found] == [words for words, *_ in expected]
     assert [[r.low, r.high] for r in found] == [pytest.approx(loads, rel=1e-6) for _, *loads in expected]
-
-
-TURNING = brentq(lambda x: np.tan(x) - np.tanh(x), 3.8, 4.0)
-"""The first number of a beam that may turn at one end, the other one clamped or free: tan(b) = tanh(b)."""
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize(("length", "stiffness"), [(1.0, 1.0), (1e-3, 7e-13), (1e-3, 3e-5), (1e4, 1e9)])
-def test_frequencies_of_a_rod_that_turns_freely_in_any_units(
-    length: float, stiffness: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A pinned and free beam, tan(b) = tanh(b): b = 3.92660231, 7.06858275, and rigid rotations left out.
-
-    Three multipliers hold the rotations: theirs is a size of their own, beside which round-off makes finite
-    eigenvalues of the infinite ones.
-    """
-    monkeypatch.setattr("rodfem.diagram.sweep.LOADS", 2)
-    ends = End(position=lambda c: (0.0, 0.0, 0.0)), free(follower=lambda c: (0.0, 0.0, -c.P))
-    scene = classics.column(
-        "pinned", ends, (0.0, stiffness / length**2), interval=(0.0, length), inertia=classics.BEAM,
-        energy=lambda v, k, c: bending_and_twist(k, (c.EI, c.EI, c.EI)), constants={"EI": stiffness},
-        ordinate=Ordinate("tip", s=length, of=lambda r, q: r[0]),
-    )  # fmt: skip
-    branch = trace(scene, Discretization(elements=5, degree=7), Plan(error_bars=False))[0]
-    measured = np.array([mu for mu, _ in branch.points[0].omega2]) * length**4 / stiffness
-    b = TURNING, brentq(lambda x: np.tan(x) - np.tanh(x), 7.0, 7.1)
-    assert branch.points[0].negative == 0
-    assert np.allclose(measured[:4], np.repeat(b, 2) ** 4, rtol=1e-6)
 
 
 @pytest.mark.ranks

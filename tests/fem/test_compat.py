@@ -19,7 +19,6 @@ from petsc4py import PETSc
 from rodfem import Discretization, Plan, Scene, SetupError, Solver, clamped, compat, free, trace
 from rodfem.fem import form_compiler
 from rodfem.fem.known import readable
-from rodfem.fem.shape import Shape
 from rodfem.fem.system import System
 
 pytestmark = pytest.mark.versions
@@ -97,20 +96,6 @@ def test_complex_petsc_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(PETSc, "ScalarType", np.complex128)
     with pytest.raises(SetupError, match="complex"):
         reload(compat)
-
-
-@pytest.mark.ranks
-@pytest.mark.short
-def test_least_stretch_is_that_of_all_elements() -> None:
-    """Of equal waves, which elements have at other places between their samples; on whatever number of ranks."""
-    system = System(scene(), Discretization("reduced", 7, 6))
-    shape, fields = Shape(system), system.fields
-    strains = np.zeros((*fields.dofs["v"].shape[:2], len(system.scene.free_strains)))
-    strains[..., -1] = 1.0 + 0.1 * np.cos(4.9 * fields.coordinates(5))
-    state = system.vector(fields.filled({"v": strains}))
-    fine = compat.lagrange_basis(5, np.linspace(0, 1, 4001))
-    values = system.at(state).values("v")[shape.cells, :, -1] @ fine.T
-    assert abs(shape.stretch(state) - COMM.allreduce(values.min(), op=MPI.MIN)) < 1e-7
 
 
 # --- numbers in the functions of a scene are values of its compiled forms, not part of their text

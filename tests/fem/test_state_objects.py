@@ -1,16 +1,10 @@
 """A state owns its numbers: no other state, load or parameter that is evaluated meanwhile changes them."""
 
-from math import pi
-
 import numpy as np
 import pytest
-from classics import column
 from small_states import plain
 
-from rodfem import Discretization, Ordinate, clamped
-from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.fem.state import State, line
-from rodfem.fem.system import System
 from rodfem.stability.inertia import Inertia
 from rodfem.stability.nonsymmetric import NonsymmetricSolver
 
@@ -39,34 +33,6 @@ def test_numbers_stay_when_another_state_is_evaluated(name: str) -> None:
     np.testing.assert_array_equal(numbers(state), before)
     with pytest.raises(ValueError, match="read-only"):
         state.local[0] = 1.0
-
-
-@pytest.mark.ranks
-@pytest.mark.long
-@pytest.mark.versions
-@pytest.mark.short
-@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-def test_a_line_of_parameters_is_a_scene_with_those_values(formulation: str) -> None:
-    """Also where the ends are: the ordinate is measured from them."""
-    rod = column(
-        "moved", (clamped(lambda c: (c.e, 0.0, 0.0)), clamped(lambda c: (c.e, 0.0, 1.0 - c.d))), (0.05, 0.5), load="d",
-        constants={"d": 0.1, "e": 0.0}, ordinate=Ordinate("place of the middle", s=0.5, of=lambda r, q: r[0]),
-        start=lambda s: np.stack([np.cos(np.sin(pi * s)), 0 * s, np.sin(np.sin(pi * s)), 0 * s], axis=1),
-    )  # fmt: skip
-    moved = rod.varying("d", rod.span, e=0.7, B2=3.0)
-    discretization = Discretization(formulation, 4, 3)
-    given, expected = (BranchSolver(System(scene, discretization)) for scene in (rod, moved))
-    x = expected.start(0.2)
-    assert abs(given.shape.ordinate(x) - expected.shape.ordinate(x)) > 0.5
-    given.system.line = line(rod, {"d": 0.15, "e": 0.7, "B2": 3.0}, {"d": 0.25})
-    y = x.copy()
-    given.system.set_load(y, 0.2)  # d = 0.15 + 0.25 * 0.2 = 0.2
-    assert given.shape.ordinate(y) == pytest.approx(expected.shape.ordinate(x), abs=1e-14)
-    assert given.system.at(y).energy() == pytest.approx(expected.system.at(x).energy(), rel=1e-14)
-    ours, theirs = given.system.new_vector(), expected.system.new_vector()
-    given.system.at(y).residual(ours)
-    expected.system.at(x).residual(theirs)
-    assert (ours - theirs).norm() < 1e-13 * theirs.norm()
 
 
 @pytest.mark.ranks

@@ -13,26 +13,12 @@ from hard.published import pressed
 from hemitropic_cases import DEFAULT
 from hemitropic_cases import scene as hemitropic
 
-from rodfem import (
-    Discretization,
-    End,
-    Inertia,
-    Ordinate,
-    Plan,
-    Ring,
-    Scene,
-    SceneError,
-    Solver,
-    clamped,
-    free,
-    pinned,
-    trace,
-)
+from rodfem import Discretization, Inertia, Ordinate, Plan, Scene, SceneError, Solver, trace
 from rodfem.continuation.kinds import BRANCH_POINT
-from rodfem.fem.newton import relax
 from rodfem.fem.shape import link
 from rodfem.fem.system import FEW, System
 from rodfem.forms.energy import bending_and_twist
+from rodfem.problem.ends import End, Ring, clamped, free, pinned
 from rodfem.problem.functions import Constants
 from rodfem.writhe import lies_on_itself
 
@@ -94,27 +80,6 @@ def test_a_fine_mesh_has_the_same_symmetries(rod: Scene, expected: int) -> None:
     system = System(rod, Discretization("reduced", 1000, 1))
     assert system.fields.unknowns > FEW
     assert len(system.symmetries) == expected
-
-
-@pytest.mark.ranks
-@pytest.mark.few(1)
-@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-def test_generators_are_null_vectors(formulation: str) -> None:
-    """``S g = 0`` at an equilibrium, for the buckled pinned rod and both its symmetries."""
-    solver = Solver(column(pinned(), SLIDING, B=1.0), Discretization(formulation, 8, 6)).equilibria
-    system = solver.system
-    x = solver.start(15.0, bent=0.8)
-    system.set_phase(x)
-    assert relax(system, x, solver.axis).converged
-    assert solver.shape.ordinate(x) > 0.1
-    assert len(system.drifts) == 2
-    state = system.at(x)
-    generators = [state.generator(i) for i in range(2)]
-    system.set_phase(None)
-    matrix = state.jacobian(solver.axis)
-    for g in generators:
-        assert system.norm(g) > 0.1
-        assert (matrix * g).norm() < 1e-9 * matrix.norm()
 
 
 @pytest.mark.long

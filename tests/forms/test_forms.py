@@ -16,8 +16,6 @@ from rodfem.forms.kinematics import RODS, curvature, strain
 from rodfem.forms.lagrangian import pointwise, reduced
 from rodfem.forms.rotation import product, rotation
 from rodfem.forms.symmetry import cross, left, right
-from rodfem.problem import quaternions
-from rodfem.problem.quaternions import CONJUGATE, directors, of_vector
 
 pytestmark = pytest.mark.versions
 
@@ -55,20 +53,6 @@ def test_rotation_is_that_of_the_normalised_quaternion() -> None:
 def test_product_composes_rotations() -> None:
     both = value(rotation(product(vector(P), vector(Q))))
     np.testing.assert_allclose(both, (scipy_rotation(P) * scipy_rotation(Q)).as_matrix(), atol=1e-15)
-
-
-def test_quaternions_of_numbers() -> None:
-    """Arrays of them against scipy's rotations, lengths other than one and no rotation among them."""
-    q, turns = (
-        np.array([[P, Q], [Q, P]]),
-        np.array([[[0.3, -0.2, 0.9], [0.0, 0.0, 0.0]], [[3.0, 0.1, 0.0], [1e-9, 0, 0]]]),
-    )
-    R, S = directors(q), directors(of_vector(turns))
-    for i in np.ndindex(2, 2):
-        np.testing.assert_allclose(R[i], scipy_rotation(q[i]).as_matrix(), atol=1e-15)
-        np.testing.assert_allclose(S[i], Rotation.from_rotvec(turns[i]).as_matrix(), atol=1e-15)
-    np.testing.assert_allclose(directors(quaternions.product(q, of_vector(turns))), R @ S, atol=1e-15)
-    np.testing.assert_allclose(quaternions.product(q, q * CONJUGATE)[..., 1:], 0.0, atol=1e-15)
 
 
 def test_curvature_of_a_helix() -> None:

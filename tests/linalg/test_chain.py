@@ -9,11 +9,9 @@ from golden_cases import cases, distinct
 from mpi4py import MPI
 from petsc4py import PETSc
 from random_chains import matrix_of, random_chain
-from small_states import scene as small_scene
 
 import rodfem.linalg
-from rodfem import ConvergenceError, Discretization, Plan, Solver, trace
-from rodfem.continuation.kinds import BRANCH_POINT, FOLD
+from rodfem import ConvergenceError, Discretization, Solver
 from rodfem.linalg.chain import Chain
 from rodfem.linalg.factorization import Mumps
 
@@ -101,25 +99,6 @@ def test_matrices_of_every_scene(name: str) -> None:
             matrix.axpy(shift - sigma, found.inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             shift = sigma
             symmetric.agree(matrix)
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("formulation", ["reduced", "pointwise"])
-@pytest.mark.parametrize("name", ["cord", "hemitropic", "ruler"])
-def test_beside_special_points(name: str, formulation: str) -> None:
-    """The count is MUMPS's from 1e-8 to 1e-2 of the lowest bending eigenvalue beside an eigenvalue that is zero."""
-    diagram = trace(small_scene(name), Discretization(formulation, 6, 6), Plan(depth=1, error_bars=False))
-    solver, seen = diagram.solvers[0], 0
-    both = Both("cholesky", solver.system.fields.dense_rows)
-    for special in (s for branch in diagram for s in branch.special if s.kind in (FOLD, BRANCH_POINT)):
-        matrix, shift = solver.inertia.at(special.point.x).matrix, 0.0
-        for size in 10.0 ** np.arange(-8, -1):
-            for sigma in (-size * solver.inertia.scale, size * solver.inertia.scale):
-                matrix.axpy(shift - sigma, solver.inertia.metric, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-                shift = sigma
-                both.agree(matrix)
-                seen += 1
-    assert seen >= 14
 
 
 @pytest.mark.long

@@ -60,26 +60,6 @@ def test_inertia_and_solutions(name: str, state: str, formulation: str, load: fl
         check(factors, matrix, right)
 
 
-@pytest.mark.few(1)
-@pytest.mark.versions
-@FORMULATIONS
-@pytest.mark.parametrize(("name", "load"), [("follower", 10.0), ("hemitropic", 0.3)])
-def test_matrix_without_symmetry(formulation: str, name: str, load: float) -> None:
-    if name == "follower":
-        formulation = "pointwise"
-    system, x = at(name, "plain", formulation, load)
-    factors = Mumps("lu")
-    row = system.metric * x
-    system.set_load(row, 1.0)
-    matrix = system.at(x).jacobian(row)
-    right, out = system.load_axis(), system.new_vector()
-    factors(matrix)
-    assert factors.regular
-    factors.solve(right, out)
-    expected = np.linalg.solve(gathered(matrix).toarray(), whole(right))
-    np.testing.assert_allclose(whole(out), expected, rtol=0, atol=1e-8 * abs(expected).max())
-
-
 @pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 @pytest.mark.parametrize(("formulation", "elements"), [("reduced", 5000), ("pointwise", 2000)])
 def test_long_rods(formulation: str, elements: int) -> None:

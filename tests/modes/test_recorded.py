@@ -12,7 +12,7 @@ from modes.test_modes import shape
 
 import rodfem
 from rodfem import ConvergenceError, Discretization, Plan, Scene
-from rodfem.modes.finder import FEWEST, ModeFinder
+from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Typical, typical_of
 from rodfem.ranks import in_words
 from rodfem.report.page import payload_of
@@ -25,25 +25,6 @@ def recorded(scene: Scene, plan: Plan, folder: Path, mesh: Discretization = MESH
     rodfem.run(scene, mesh, plan, folder, figures=False, quiet=True)
     with h5py.File(folder / "states.h5") as file:
         return {name: list(typical_of(group)) for name, group in file["branches"].items()}
-
-
-@pytest.mark.short
-def test_euler_column(folder: Path) -> None:
-    """Clamped-free, EI = 1 and 2: mu = EI w^2 - P with w = pi/2, 3 pi/2, ..., torsion w^2; as many as the index."""
-    found = recorded(classics.euler("clamped-free"), Plan((0.0, 45.0), depth=0, error_bars=False), folder)
-    w = np.pi / 2 * np.arange(1, 14, 2)
-    modes = found["straight"]
-    loads = json.loads((folder / "diagram.json").read_text())["branches"][0]["columns"]["load"]
-    assert {0, len(loads) - 1} <= {each.row for each in modes}
-    critical = sorted(x for x in (*w**2, *2 * w**2) if x < 45.0)
-    assert all(min(abs(loads[each.row] - load) for each in modes) < 1e-5 for load in critical)
-    for each in modes:
-        expected = np.sort(np.concatenate([w**2 - loads[each.row], 2 * w**2 - loads[each.row], w**2]))
-        assert each.found is not None and len(each.found.value) >= max(FEWEST, (expected < -1e-3).sum())
-        np.testing.assert_allclose(each.found.value, expected[: len(each.found.value)], atol=1e-4)
-        first = np.abs(each.found.rotation[0]).max(axis=1)  # sqrt(2) sin w s, of unit kinetic energy, at the nodes
-        s = np.linspace(0, 1, len(first))[::6]
-        np.testing.assert_allclose(first[::6], 2**0.5 * np.sin(w[0] * s), atol=1e-5)
 
 
 @pytest.mark.usefixtures("few_loads")

@@ -12,15 +12,7 @@ from scipy.special import ellipe, ellipk
 
 from rodfem.file_format import LOCUS
 from rodfem.output.pieces import PLANAR, STABLE, UNSTABLE, pieces_of
-from rodfem.output.plot_diagram import (
-    SINGULAR,
-    UNEXPLAINED,
-    dense,
-    draw_branches,
-    draw_diagram,
-    drawn,
-    figure_of,
-)
+from rodfem.output.plot_diagram import SINGULAR, UNEXPLAINED, dense, draw_branches, draw_diagram, drawn, figure_of
 from rodfem.output.plot_locus import draw_locus
 from rodfem.output.style import PALETTE
 

@@ -10,26 +10,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rodfem import (
-    Discretization,
-    End,
-    InputError,
-    Ordinate,
-    Plan,
-    Scene,
-    Solver,
-    at,
-    circular_guide,
-    clamped,
-    run,
-    sliding,
-    sliding_hinge,
-    trace,
-)
+from rodfem import Discretization, InputError, Ordinate, Plan, Scene, Solver, at, run, trace
 from rodfem.forms.energy import bending_and_twist
 from rodfem.output.glyphs import Look
 from rodfem.output.render import read_state
 from rodfem.output.style import STEEL
+from rodfem.problem.ends import End, circular_guide, clamped, sliding, sliding_hinge
 
 E2 = (0.0, 1.0, 0.0)
 TAN = 4.493409457909064**2

@@ -7,21 +7,9 @@ import pytest
 import ufl
 from classics import SUPPORTS, column
 
-from rodfem import (
-    Attachment,
-    Discretization,
-    End,
-    Inertia,
-    Plan,
-    Solver,
-    clamped,
-    free,
-    integral,
-    pinned,
-    sliding,
-    trace,
-)
+from rodfem import Attachment, Discretization, Inertia, Plan, Solver, integral, trace
 from rodfem.errors import SceneError
+from rodfem.problem.ends import End, clamped, free, pinned, sliding
 
 pytestmark = pytest.mark.ranks
 

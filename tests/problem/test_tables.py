@@ -12,22 +12,10 @@ import ufl
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from rodfem import (
-    Attachment,
-    Diagram,
-    Discretization,
-    Inertia,
-    Ordinate,
-    Plan,
-    Scene,
-    clamped,
-    free,
-    path,
-    tabulated,
-    trace,
-)
+from rodfem import Attachment, Diagram, Discretization, Inertia, Ordinate, Plan, Scene, path, tabulated, trace
 from rodfem.errors import SceneError
 from rodfem.forms.energy import bending_and_twist
+from rodfem.problem.ends import clamped, free
 
 MESH = Discretization("auto", 8, 6)
 TIP = Ordinate("tip", s=1.0, of=lambda r, q: hypot(r[0], r[1]))

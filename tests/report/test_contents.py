@@ -2,13 +2,11 @@
 
 import base64
 import json
-from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 
 from rodfem.modes.modes import RIGID
 from rodfem.output.plot_frequencies import curves
@@ -115,21 +113,6 @@ def test_writhe_of_a_knot() -> None:
     assert writhe(mirrored, round_) == pytest.approx(-exact, abs=1e-4)
     assert writhe(lambda t: trefoil(-t)[0], round_) == pytest.approx(exact, abs=1e-4)
     assert writhe(lambda t: trefoil(t)[0] * (1, 1, 0), round_) == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.few(1)
-@pytest.mark.parametrize("turns", [2.5, 27.25])
-def test_writhe_of_an_open_helix(turns: float) -> None:
-    """Of radius one and rise b a radian: ``(2 pi)^-1 int (T - x) f(x) dx``, as all pairs x apart are alike."""
-    b, T = 0.3, 2 * np.pi * turns
-
-    def density(x: float) -> float:
-        return b * (2 - 2 * np.cos(x) - x * np.sin(x)) / (2 - 2 * np.cos(x) + b**2 * x**2) ** 1.5
-
-    pieces = np.linspace(0.0, T, int(8 * turns) + 1)
-    exact = sum(quad(lambda x: (T - x) * density(x), low, high, epsabs=1e-12)[0] for low, high in pairwise(pieces))
-    found = writhe(lambda t: np.array([np.cos(t), np.sin(t), b * t]).T, (0.0, T))
-    assert found == pytest.approx(exact / (2 * np.pi), rel=1e-4)
 
 
 def group_of(**arrays: np.ndarray) -> Any:

@@ -70,30 +70,6 @@ def test_methods_agree(name: str, load: float, bent: bool, formulation: str) -> 
     assert assessor(x, "count").negative == negative
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("name", "formulation"),
-    [
-        ("tip_on_plane", "reduced"),
-        ("no_mean_deflection", "pointwise"),
-        ("ring", "reduced"),
-        ("pressed_ring", "pointwise"),
-    ],
-)
-def test_methods_agree_with_other_ends_and_constraints(name: str, formulation: str) -> None:
-    """Moving ends are rows, their moments and multipliers of constraints columns of C; eigenvalues come in pairs."""
-    given = getattr(classics, name)()
-    solver = Solver(given, Discretization(formulation, 4, 3)).equilibria
-    x, outcome = first_equilibrium(solver, 0.9 * given.span[0] + 0.1 * given.span[1])
-    assert outcome.converged
-    assessor = Assessor(solver.system)
-    expected = assessor(x, "dense", 3)
-    for method in SPARSE:
-        found = assessor(x, method, 3)
-        np.testing.assert_allclose(found.values, expected.values, rtol=1e-9, err_msg=method)
-        assert found.certified, method
-
-
 def test_names() -> None:
     """Ten nodes that turn have 30 eigenvalues at most; docs/running.md says what each method does."""
     page = (Path(__file__).parents[2] / "docs" / "running.md").read_text()

@@ -15,8 +15,7 @@ from petsc4py import PETSc
 from rodfem import Attachment, ConvergenceError, Discretization, Scene, Solver, clamped, free
 from rodfem.continuation.first_equilibrium import examined, first_equilibrium
 from rodfem.fem.newton import NewtonResult
-from rodfem.linalg.matrices import rounding
-from rodfem.stability.inertia import Factored, Index, quotient_error
+from rodfem.stability.inertia import Factored, Index
 from rodfem.stability.near_zero import decide, resolve
 
 EPS = np.finfo(float).eps
@@ -27,19 +26,6 @@ def petsc_matrix(comm: MPI.Comm, own: sp.csr_matrix) -> PETSc.Mat:
     n = own.shape[0]
     csr = (own.indptr.astype(PETSc.IntType), (own.indices + comm.rank * n).astype(PETSc.IntType), own.data)
     return PETSc.Mat().createAIJ(((n, PETSc.DETERMINE),) * 2, csr=csr, comm=comm)
-
-
-def test_rounding_of_a_product() -> None:
-    """``eps (sum_ij (v_i S_ij x_j)^2)^(1/2)``, blocks and vectors of all ranks together."""
-    comm = MPI.COMM_WORLD
-    own = sp.random(9, 9, density=0.4, random_state=comm.rank, format="csr")
-    matrix = petsc_matrix(comm, own)
-    v, x = matrix.createVecRight(), matrix.createVecRight()
-    v.array[:], x.array[:] = np.random.default_rng(comm.rank).normal(size=(2, 9))
-    parts = (v.array_r[:, None] * own.toarray() * x.array_r) ** 2
-    assert rounding(matrix, v, x) == pytest.approx(EPS * np.sqrt(comm.allreduce(parts.sum())), rel=1e-12)
-    parts = (v.array_r[:, None] * own.toarray() * v.array_r) ** 2
-    assert quotient_error(matrix, v) == pytest.approx(10 * EPS * np.sqrt(comm.allreduce(parts.sum())), rel=1e-12)
 
 
 def test_zeros_of_symmetries_stay_zeros() -> None:

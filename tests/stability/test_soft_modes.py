@@ -5,21 +5,19 @@ from dataclasses import replace
 from functools import cache
 from math import pi
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import ufl
 from classics import SUPPORTS, column, push
 from continuation.test_index_chain import localised
 from mpi4py import MPI
 
-from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, Solver, clamped, free, load, pinned, sliding, trace
+from rodfem import Diagram, Discretization, Ordinate, Plan, Scene, Solver, clamped, free, load, pinned, trace
 from rodfem.adaptivity.soft_states import SoftStates
 from rodfem.app.terminal import Report
 from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
-from rodfem.output.pieces import UNDECIDED, UNSTABLE, pieces_of, typical_state
+from rodfem.output.pieces import UNSTABLE, pieces_of
 
 SLIDING = "sliding along the rod"
 
@@ -124,21 +122,6 @@ def test_a_mesh_that_pins_a_buckle_is_found_out(folder: Path) -> None:
 # --- in words and pictures ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
-def test_an_index_that_no_richer_mesh_confirms() -> None:
-    """At twenty times its critical load an elastica has other strains on 4 linear elements than on 2, of one index."""
-    elastica = column("elastica", SUPPORTS["clamped-free"], (0.0, 50.0))
-    for mesh, why in (
-        (Discretization("reduced", 2, 1), "another state at load 50"),
-        (Discretization("reduced", 8, 4), ""),
-    ):
-        diagram = trace(elastica, mesh, Plan(depth=1, most_branches=2, error_bars=False))
-        verdict = Solver(elastica, mesh).assess(diagram[1].points[-1])
-        assert verdict.stable is (None if why else True)
-        assert (why in verdict.uncompared) if why else verdict.uncompared == ""
-        assert ("not compared with a richer mesh" in str(verdict)) == bool(why)
-
-
 def test_a_bent_cantilever_that_is_nearly_round_has_one_name_for_its_rotation() -> None:
     """It turns about its axis as its sections turn back; it slides nowhere, and its mode is that soft mode."""
     round_but = lambda v, k, c: bending_and_twist(k, (1.0, 1.0 + 1e-6, 1.0))  # noqa: E731
@@ -149,20 +132,6 @@ def test_a_bent_cantilever_that_is_nearly_round_has_one_name_for_its_rotation() 
         (mode,) = diagram.assess(point).soft
         assert mode.name == "rotation about e3 with turning of the cross-sections about d3"
         assert mode.name in diagram.modes(point, 2).motion and "mixed" not in diagram.modes(point, 2).motion
-
-
-def test_undecided_pieces_have_a_style_of_their_own() -> None:
-    columns: dict[str, Any] = {"load": [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], "ordinate": [0.0] * 6}
-    columns |= {"negative": [0, 0, 0, 0, 1, 1], "undecided": [0, 0, 1, 1, 0, 0], "arclength": columns["load"]}
-    branch = {"name": "a", "parent": None, "columns": columns, "special": []}
-    found = [(p.kind, p.label, p.first, p.last) for p in pieces_of(branch)]
-    assert found == [
-        ("stable", "0", 0, 1),
-        (UNDECIDED, "0 or 1", 1, 4),
-        (UNSTABLE, "1", 4, 5),
-    ]
-    columns["negative"], columns["undecided"] = [0] * 6, [1] * 6
-    assert typical_state({"branches": [branch]})[2].endswith("stability undecided, index 0 or 1")
 
 
 @pytest.mark.parametrize(
@@ -191,25 +160,3 @@ def test_a_sign_that_is_the_error_of_the_mesh(elements: int) -> None:
         assert row.negative <= (row.load > 1) <= row.negative + row.undecided or row is point.point
     assert sum(row.undecided for row in found[0].points if row.load < 1.6) == 0
     assert any("the index is 0 or 1" in sentence for sentence in found.warnings)
-
-
-def test_a_mesh_that_cannot_hold_the_turns_decides_no_index() -> None:
-    """A rod twisted by seven turns between tangents that are held is stable to 8.99 times its stiffness.
-
-    Four elements of degree 6 have four torsional eigenvalues of their own there, far from zero.
-    """
-
-    def turned(c: Any) -> tuple[Any, ...]:
-        return (ufl.cos(c.phi / 2), 0.0, 0.0, ufl.sin(c.phi / 2))
-
-    def start(s: np.ndarray) -> np.ndarray:
-        return np.stack([np.cos(22.0 * s), 0 * s, 0 * s, np.sin(22.0 * s)], axis=1)
-
-    shaft = column(
-        "shaft", (clamped(), sliding((0.0, 0.0, None), turned)), (44.0, 45.0), load="phi", start=start,
-        constants={"phi": 0.0, "B1": 1e3, "B2": 1e3}, ordinate=Ordinate("deflection", s=0.5, of=lambda r, q: r[1]),
-    )  # fmt: skip
-    found = trace(shaft, Discretization("reduced", 4, 6), Plan(depth=0))
-    assert [(row.negative, row.undecided) for row in found[0].points] == [(0, 4)] * len(found[0].points)
-    assert "undecided, 0 negative, 4 undecided" in repr(found.assess(found[0].points[0]))
-    assert "unstable" not in found.in_words()
