@@ -37,11 +37,7 @@ def test_versions_are_those_of_the_libraries(capsys: pytest.CaptureFixture[str])
 
 @pytest.mark.parametrize(
     ("words", "sentence"),
-    [
-        (["inof"], "Unknown command 'inof': choose info"),
-        (["info", "nowhere"], "nowhere"),
-        (["info"], "folder"),
-    ],
+    [(["inof"], "Unknown command 'inof': choose info"), (["info", "nowhere"], "nowhere"), (["info"], "folder")],
 )
 def test_mistakes_are_one_sentence(words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as left:

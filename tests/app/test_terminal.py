@@ -61,11 +61,7 @@ def test_energy_is_that_of_the_rod_alone(folder: Path, printed: Any) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("rod", "ignored", "better"),
-    [
-        ("unshearable", ["v1", "v2"], "flexible"),
-        ("flexible", [], ""),
-    ],
+    ("rod", "ignored", "better"), [("unshearable", ["v1", "v2"], "flexible"), ("flexible", [], "")]
 )
 def test_an_energy_of_strains_that_a_rod_does_not_have(
     rod: str, ignored: list[str], better: str, folder: Path, printed: Any

@@ -63,8 +63,7 @@ def test_a_fold_beside_a_subcritical_pitchfork(beside: float) -> None:
 @pytest.mark.ranks
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
-    ("beside", "kind"),
-    [(1e-2, "supercritical"), *on_one_rank((-1e-6, "subcritical"), (1e-6, "supercritical"))],
+    ("beside", "kind"), [(1e-2, "supercritical"), *on_one_rank((-1e-6, "subcritical"), (1e-6, "supercritical"))]
 )
 def test_the_sign_of_the_coefficient_names_the_pitchfork(beside: float, kind: str) -> None:
     """Also where the fold is as near to the branch point as the uncertainty of that, which a note says."""
@@ -106,8 +105,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(
-    ("scene", "load", "change"),
-    [pytest.param(*x, marks=pytest.mark.alone, id=x[0].__name__) for x in CASES],
+    ("scene", "load", "change"), [pytest.param(*x, marks=pytest.mark.alone, id=x[0].__name__) for x in CASES]
 )
 def test_where_a_slow_eigenvalue_crosses_zero(scene: Callable[[], Scene], load: float, change: tuple[int, int]) -> None:
     """Closed forms of rigid links; bending lowers them by a part of k/3, which is less than the bars."""

@@ -46,19 +46,6 @@ def test_shortening_and_part_of_a_slope(eps: float, span: tuple[float, float]) -
     assert holds(law, pi**2 / 8 / eps**2, 1e-6)
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("span", [(8.0, 11.0), (9.8, 9.9)])
-def test_slope_that_is_no_part_of_the_shortening(span: tuple[float, float]) -> None:
-    """Up to ``x = 4 eps^2``, round-off, eps = 1e-6 gives the law: it is ``pi^2/2 x``, uncertain by ``4 eps/A`` of it.
-
-    The branch is solved up to A = 0.17, on the lesser span up to a quarter of that.
-    """
-    for eps in (0.0, 1e-6):
-        law = law_of(lambda r, q, e=eps: 1 - r[2] + e * 2 * q[2] * q[0], span=span)
-        assert (law.kind, law.power) == ("supercritical pitchfork", 1)
-        assert holds(law, pi**2 / 2, 1e-6 + 120 * eps) and law.uncertainty >= 4 * eps / 0.17 * pi**2 / 2
-
-
 @pytest.mark.few(1)
 @pytest.mark.parametrize("part", [1.0, 1e-3])
 def test_transcritical_point(part: float) -> None:

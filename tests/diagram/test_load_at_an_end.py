@@ -34,11 +34,7 @@ def rows_are_apart(diagram: Diagram) -> bool:
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("span", "at", "accuracy"),
-    [
-        ((0.0, 20.0), (20.0,), None),
-        ((20.0, 0.0), (20.0, 20.0, 0.0), None),
-        ((0.0, 20.0), (0.0, 20.0), 1e-6),
-    ],
+    [((0.0, 20.0), (20.0,), None), ((20.0, 0.0), (20.0, 20.0, 0.0), None), ((0.0, 20.0), (0.0, 20.0), 1e-6)],
 )
 def test_states_at_the_ends_of_the_range(span: tuple[float, float], at: tuple[float, ...], accuracy: float) -> None:
     """Straight with index 2, bent in the one plane and stable, bent in the other one with index 1; a row each."""

@@ -49,11 +49,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         cwd=tree, env=os.environ | {"PYTHONPATH": ""}, capture_output=True, text=True,
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
-    return {
-        "tree": clean,
-        "sdist": next(folder.glob("*.tar.gz")),
-        "wheel": next(folder.glob("*.whl")),
-    }
+    return {"tree": clean, "sdist": next(folder.glob("*.tar.gz")), "wheel": next(folder.glob("*.whl"))}
 
 
 def files(folder: Path) -> set[str]:

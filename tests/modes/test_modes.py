@@ -1,15 +1,11 @@
 """Modes against closed forms, finite differences of the shape and of the energy; files, pictures, the command line."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import classics
-import h5py
 import numpy as np
 import pytest
 from closed_forms import column as beck_value
-from hemitropic_cases import run_demo
-from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.spatial.transform import Rotation
 from small_states import buckled, plain
@@ -215,15 +211,3 @@ def test_planar_rod_stays_in_its_plane() -> None:
 
 
 # --- files ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.long
-@pytest.mark.short
-def test_null_vectors_in_files_are_motions(folder: Path) -> None:
-    """At the first buckling load the straight rod's null vector moves it sideways, and holds its ends."""
-    run_demo("--range", "0", "0.2", "--no-figures", "--output", str(folder))
-    if MPI.COMM_WORLD.rank == 0:
-        with h5py.File(folder / "states.h5") as file:
-            group = file["branches/straight/special/0/null_vector_0"]
-            assert abs(group["r"][[0, -1]]).max() < 1e-10 < 1e-2 < abs(group["r"][:, :2]).max()
-            assert abs(group["q"][[0, -1]]).max() == 0.0

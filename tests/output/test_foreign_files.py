@@ -72,10 +72,7 @@ ENTRIES: list[tuple[Callable[[dict[str, Any]], None], str]] = [
 def test_texts(text: str, bad: Path) -> None:
     path = bad / "diagram.json"
     path.write_text(text)
-    readers = (
-        lambda: rodfem.load_json(path),
-        lambda: rodfem.load(bad, SCENE),
-    )
+    readers = (lambda: rodfem.load_json(path), lambda: rodfem.load(bad, SCENE))
     for read in readers:
         sentence = refused(read)
         assert str(path) in sentence
@@ -130,10 +127,7 @@ def spoil(path: Path, change: bytes | Callable[[h5py.File], None]) -> None:
 def test_states(change: Any, words: str, bad: Path) -> None:
     path = bad / "states.h5"
     spoil(path, change)
-    for read in (
-        lambda: rodfem.load(bad, SCENE),
-        lambda: render.draw_shape(path, "straight", 0, bad / "a.png"),
-    ):
+    for read in (lambda: rodfem.load(bad, SCENE), lambda: render.draw_shape(path, "straight", 0, bad / "a.png")):
         sentence = refused(read)
         assert words in sentence
         assert "\n" not in sentence

@@ -62,11 +62,7 @@ def test_stable_in_the_plane_is_not_called_stable(folder: Path) -> None:
     column = {"negative_in_space": [0, 0, 1, 1, 0, 2, 2]}  # at the branch point itself an eigenvalue is zero
     planar = branch("planar", [0.0] * 7, [0, 0, 0, 0, 0, 1, 1], special=[point], columns=column)
     found = [(p.kind, p.label, p.first, p.last) for p in pieces_of(planar)]
-    assert found == [
-        (STABLE, "0 (0)", 0, 1),
-        (PLANAR, "0 (1)", 1, 4),
-        (UNSTABLE, "1 (2)", 4, 6),
-    ]
+    assert found == [(STABLE, "0 (0)", 0, 1), (PLANAR, "0 (1)", 1, 4), (UNSTABLE, "1 (2)", 4, 6)]
     assert {STABLE, PLANAR, "negative eigenvalues in the plane (in space)"} <= set(legend(planar))
     del planar["columns"]["negative_in_space"]
     assert [p.label for p in pieces_of(planar)] == ["0", "1"]

@@ -239,13 +239,6 @@ def test_numbers() -> None:
     assert turn(0.5) == pytest.approx((np.cos(pi / 8), 0, 0, np.sin(pi / 8)))
 
 
-@pytest.mark.ranks
-@pytest.mark.parametrize("mesh", [Discretization("pointwise"), Discretization(factors="petsc")])
-def test_both_formulations_and_factors(mesh: Discretization) -> None:
-    load, error, warnings = found(column(tabulated(np.linspace(0, 1, 1001), wave(np.linspace(0, 1, 1001)))), mesh)
-    assert abs(load - 2.577330385411) <= error < 1e-9 and not warnings
-
-
 def test_a_table_as_nested_conditionals_is_refused_in_a_sentence() -> None:
     def stiffness(s: Any) -> Any:
         value: Any = 1.0
