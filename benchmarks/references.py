@@ -1,7 +1,7 @@
 """The reference values, computed anew when the benchmark runs: by none of the programs that are measured.
 
 Straight states: roots of transcendental equations, and eigenvalues by Ritz's method with polynomials.  Bent states:
-shooting with scipy's Runge-Kutta method of order 8.  The solvers are those of the tests.
+shooting with scipy's Runge-Kutta method of order 8.  Closed forms are those of the tests.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from numpy.polynomial import legendre
 from scipy.linalg import eigh, null_space
 from scipy.optimize import newton
 
+from benchmarks.shooting_solver import Problem, Rod
 from benchmarks.targets import TARGETS
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
@@ -23,7 +24,6 @@ sys.path.append(str(Path(__file__).parents[1] / "tests"))
 import closed_form_hemitropic
 import closed_forms
 import reference_values
-from shooting_solver import Problem, Rod
 
 K0 = 3 * pi
 CORD = Problem(Rod(intrinsic=(0.0, K0, 0.0)), rows=[1, 2, 3, 7, 8], shot=[0, 1, 3, 4, 5])

@@ -7,7 +7,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
 from rows import verify
 
 from rodfem import Diagram, Discretization, Plan, Scene, trace
@@ -31,15 +30,6 @@ def scene(name: str, **constants: Any) -> Scene:
     span = constants.pop("span", None)
     made: Scene = getattr(module(name), FUNCTIONS[name])(**constants)
     return made if span is None else replace(made, span=span)
-
-
-def start_of_rod(diagram: Diagram, x: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Contact force (nan where it is known) and strains ``k`` of a state at s = 0, where directors are e1, e2, e3."""
-    solver = diagram.solvers[0]
-    sample, nodes = solver.shape.sample(x), solver.system.fields.discretization.degree + 1
-    s, q = sample["s"][:nodes], sample["q"][:nodes]
-    k = [2 * np.polyder(np.polyfit(s, q[:, i], nodes - 1))[-1] for i in (1, 2, 3)]
-    return np.array([sample.get(f"n{i}", np.nan) for i in (1, 2, 3)]), np.array(k)
 
 
 @cache
