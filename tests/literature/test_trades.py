@@ -1,6 +1,8 @@
 """The programs of docs/trades, docs/how-to.md and docs/design.md assert the numbers of others that they print."""
 
+import os
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from rodfem import Diagram
 
 DOCS = Path(__file__).parents[2] / "docs"
+FILES = os.environ.get("RODFEM_ROBOTS", "")
 PAGES = [DOCS / "how-to.md", DOCS / "design.md", *sorted((DOCS / "trades").glob("[a-z]*.md"))]
 
 
@@ -21,3 +24,16 @@ def test_a_page(page: Path) -> None:
         exec(block, names)
     diagram = names.get("diagram")
     assert diagram is None or (isinstance(diagram, Diagram) and not diagram.warnings)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not FILES, reason="RODFEM_ROBOTS names no clone of StructuresComp/Helix_Bifurcation_Types")
+def test_150_experiments(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against the authors' files, where these are at hand."""
+    monkeypatch.syspath_prepend(DOCS)
+    two_grippers = import_module("two_grippers")
+    found = two_grippers.compared(two_grippers.program(), two_grippers.measured(Path(FILES)))
+    assert (found["right"], found["experiments"]) == (146, 150)
+    page = (DOCS / "trades" / "two-grippers.md").read_text()
+    for what in ("rms of the mean curvature", "rms of each", "mean"):
+        assert f"{found[what]:.1f} %" in page
