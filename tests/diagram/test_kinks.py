@@ -1,7 +1,7 @@
 """Kinks of an energy in the state: no error bar where one is inside of the rod, no index where the state is on one."""
 
 from io import StringIO
-from math import cos, isnan, sin, sqrt
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +10,6 @@ import pytest
 import ufl
 from classics import column, push
 from mpi4py import MPI
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from rodfem import Diagram, Discretization, Inertia, Ordinate, Plan, clamped, free, load, trace
 from rodfem.app.terminal import Report
@@ -75,42 +73,6 @@ def test_a_sweep_has_no_bar_beyond_a_kink() -> None:
     found = trace(rod, Discretization("auto", 6, 4))
     assert isnan(found[0].special[-1].ordinate_error)
     assert any("does not integrate the equations" in said for said in found.warnings)
-
-
-LOADS = (1.2, 1.5, 2.0, 3.0)
-
-
-def bent(energy: Any, mesh: tuple[int, int], at: tuple[float, ...] = LOADS) -> Diagram:
-    """A cantilever under a force across, of bending energy ``energy(k)`` about one axis."""
-    rod = column(
-        "bent", (clamped(), free(lambda c: (0.0, -c.P, 0.0))), (0.0, 3.5),
-        energy=lambda v, k, c: energy(k[0]) + 5 * k[1] ** 2 + k[2] ** 2,
-        ordinate=Ordinate("y", s=1.0, of=lambda r, q: r[1]),
-    )  # fmt: skip
-    return trace(rod, Discretization("auto", *mesh), Plan(depth=0, at=at))
-
-
-def deflection(load: float, width: float) -> float:
-    """Of the tip, by shooting from there."""
-
-    def moment(k: float) -> tuple[float, float]:
-        root = sqrt((k - 1) ** 2 + width**2)
-        ramp, slope = (k - 1 + root) / 2, (1 + (k - 1) / root) / 2
-        return k + 4 * ramp * slope, 1 + 4 * (slope**2 + ramp * width**2 / root**3 / 2)
-
-    def clamp(angle: float) -> np.ndarray:
-        at_tip = brentq(lambda k: moment(k)[0], -1.0, 1.0, xtol=1e-15)
-        ode = lambda s, y: (-y[1], load * cos(y[0]) / moment(y[1])[1], -sin(y[0]))  # noqa: E731
-        out = solve_ivp(ode, (0, 1), [angle, at_tip, 0.0], method="DOP853", rtol=1e-11, atol=1e-13, max_step=5e-3)
-        return np.asarray(out.y[:, -1])
-
-    angle = brentq(lambda t: clamp(t)[0], 0.05, 1.55, xtol=1e-13)
-    return float(clamp(angle)[2])
-
-
-def ordinates(found: Diagram) -> list[tuple[float, float, float]]:
-    """Loads that were asked for, with ordinate and bar."""
-    return [(s.point.load, s.point.ordinate, s.ordinate_error) for s in found[0].special if s.point.load in LOADS]
 
 
 def lateral(threshold: float) -> Diagram:
