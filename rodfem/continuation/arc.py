@@ -15,7 +15,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import groupby, pairwise
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -28,7 +27,6 @@ from rodfem.continuation.crossings import Node, clear, places
 from rodfem.continuation.curves import ALIGNED, cubic, interpolant, zero_between
 from rodfem.continuation.kinds import EVENT, LEVEL, Kind
 from rodfem.errors import SMALLER_STEPS, ConvergenceError, SceneError
-from rodfem.fem.checks import Convexity
 from rodfem.fem.newton import correct, linear_step
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import generic
@@ -118,46 +116,6 @@ class Arc:
         low, high = sorted(known)
         margin = INSIDE * (high - low)  # never onto an end: a branch point is a state of the other branch, too
         return min(max(zero_between(beyond, first, last, 1e-15), low + margin), high - margin)  # exactly
-
-    def lost_convexity(self) -> str:
-        """Why a branch ends on the arc; empty where the stored energy stays convex."""
-        solver, first, length = self.solver, self.a.arclength, self.b.arclength - self.a.arclength
-
-        def holds(t: float) -> bool:
-            try:
-                return not solver.lost_convexity(self.b.x if t == 1.0 else self.state(first + t * length))
-            except ConvergenceError:  # where the energy is not convex the equations may be singular
-                return False
-
-        lost = lost_between(solver.convexity, lambda t: self.curve(first + t * length)[0], holds)
-        return "" if lost is None else solver.not_convex(self.curve(first + lost * length)[0])
-
-
-def lost_between(
-    convexity: Convexity, state: Callable[[float], PETSc.Vec], holds: Callable[[float], bool]
-) -> float | None:
-    """First ``t`` between 0 and 1 at which ``W`` is not convex along ``state(t)``, as it is along ``state(0)``.
-
-    The least eigenvalue of the second derivative of ``W`` is a cubic, by its values and difference quotients at both
-    ends.  Where that turns, and at the end, ``holds(t)`` decides by an equilibrium.  None where ``W`` stays convex.
-    """
-    if not convexity.alters:
-        return None
-    ends = 0.0, DIFFERENCE, 1.0 - DIFFERENCE, 1.0
-    states = [state(t) for t in ends]
-    scales = convexity.scales(states[0], states[-1])
-    known = dict(zip(ends, convexity.margins(states, scales), strict=True))
-    margin = cache(lambda t: known[t] if t in known else convexity.margin(state(t), scales))
-
-    def node(t: float, other: float) -> Node:
-        return _number(t, known[t], (known[other] - known[t]) / (other - t))
-
-    last = 0.0
-    for t in [*places(node(0.0, DIFFERENCE), node(1.0, 1.0 - DIFFERENCE), 1), 1.0]:
-        if margin(t) <= 0.0 and not holds(t):
-            return zero_between(margin, last, t, LEAST) if margin(last) > 0.0 else t
-        last = t
-    return None
 
 
 def _number(s: float, value: float, slope: float) -> Node:

@@ -179,12 +179,9 @@ class BranchSolver:
         return out | {name: getattr(profile, name) for name in ("r", *NAMES)}
 
     def lost_convexity(self, x: PETSc.Vec) -> str:
-        """Why a branch ends at the state ``x``, where the stored energy is not convex any more; empty where it is."""
-        return "" if self.convexity.holds(x) else self.not_convex(x)
-
-    def not_convex(self, x: PETSc.Vec) -> str:
-        """Why a branch ends at a state ``x`` along which the stored energy is not convex."""
-        return f"the stored energy is not convex any more at {self.system.scene.load} = {self.system.scalar(x):.6g}"
+        """Why a branch ends before the state ``x``, where the stored energy is not convex any more; empty if it is."""
+        where = f"{self.system.scene.load} = {self.system.scalar(x):.6g}"
+        return "" if self.convexity.holds(x) else f"the stored energy is not convex any more at {where}"
 
     def require_convexity(self, x: PETSc.Vec) -> None:
         """Raise :class:`SceneError` for a state ``x`` to begin with along which the stored energy is not convex."""

@@ -15,7 +15,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound, derived
-from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import FIRST_BRANCH, Branch, Point, SpecialPoint, Unexplained
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import Curves, zero_near
@@ -111,24 +110,23 @@ class Sweep:
         self.observer.branch(branch)
         x = at_load(self.solver, x, loads[0])
         self.solver.require_convexity(x)
-        if not (first := self.eigensolver.at(x).spectrum).complete:
+        if not (spectrum := self.eigensolver.at(x).spectrum).complete:
             self.observer.note("  the mesh has too many unknowns to find all frequencies: those nearest zero are found")
-        self.eigensolver.slow = begins_slowly(first)
+        self.eigensolver.slow = begins_slowly(spectrum)
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:
-            latest = self._point(x)
-            steps = LoadSteps(self.solver, latest, self.span)
-            self._take(branch, latest)
+            first = self._point(x)
+            steps = LoadSteps(self.solver, first, self.span)
+            self._take(branch, first)
             for load in loads[1:]:
                 state = steps.reach(load)
                 point = self._point(state)
-                if why := Arc(self.solver, latest, point).lost_convexity() or self._dependent(state):
+                if why := self.solver.lost_convexity(state) or self._dependent(state):
                     return why
                 if load in stops:
                     steps.known = steps.known[-1:]
-                latest = point
-                self._take(branch, latest)
+                self._take(branch, point)
         finally:  # also where there is no equilibrium, or at an interrupt: nothing that has been computed is lost
             self._close(branch, None)
         return ""

@@ -10,7 +10,6 @@ from typing import NoReturn
 from rodfem.adaptivity.error_estimate import before_the_end, end_at_zero_stretch, last_admissible, located
 from rodfem.adaptivity.mesh_sequence import AccuracyControl, Meshes, TooCoarse
 from rodfem.adaptivity.soft_states import SoftRows
-from rodfem.continuation.arc import Arc
 from rodfem.continuation.branch import NOT_TRACED, Branch, Point, SpecialPoint, merge_doubles, persistent_zeros
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.follow import END_OF_RANGE, MOST_REACHED, ON_BOUND, follow, require_equilibrium
@@ -187,7 +186,7 @@ class Tracer:
         self.zeros.check(self.solver, known, row, self.specials.undecided)
         if row.stretch <= 0:
             self._end_at_zero_stretch(branch, previous, row)
-        self._require_convexity(branch, previous, row)
+        self._require_convexity(branch, row)
         self._add_special_points(branch, previous, row, "closed" if last else "")
         history.append(row)
         self._append(branch, row)
@@ -265,9 +264,9 @@ class Tracer:
                 branch.cut(special.point.arclength)
                 raise Ended(reason)
 
-    def _require_convexity(self, branch: Branch, a: Point, b: Point) -> None:
-        """End a branch at the row ``a`` if the stored energy ceases to be convex between it and ``b``."""
-        if why := Arc(self.solver, a, b).lost_convexity():
+    def _require_convexity(self, branch: Branch, row: Point) -> None:
+        """End a branch before a ``row`` at which the stored energy is not convex."""
+        if why := self.solver.lost_convexity(row.x):
             self._rest(branch)
             raise Ended(why)
 
@@ -276,7 +275,7 @@ class Tracer:
         last = last_admissible(self.solver, a, b)
         near = before_the_end(self.solver, a, last)
         if near is not None:
-            self._require_convexity(branch, a, near)
+            self._require_convexity(branch, near)
             if near.negative != a.negative:  # what passes zero before is zero at the end once more
                 require_equilibrium(self.solvers[near.mesh], near)
                 self._add_special_points(branch, a, near)

@@ -22,7 +22,7 @@ motion has, and is compared in the same way; so is the inertia in a translation 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -98,25 +98,15 @@ class Convexity:
         mine = (values[..., 0] / abs(values).max(axis=-1)).min(initial=1.0)
         return float(self.system.comm.allreduce(float(mine), op=MPI.MIN))
 
-    def scales(self, *states: PETSc.Vec) -> np.ndarray:
-        """Roots of the largest diagonals of the second derivative on each element, at some states: (cells, 1, size).
-
-        Of one state alone they are too small where a strain has hardly any stiffness left: in units of these the other
-        strains are the least eigenvalue almost everywhere, and hide it.
-        """
-        diagonals = abs(np.diagonal(np.stack([self._matrices(x) for x in states]), axis1=-2, axis2=-1))
-        return np.asarray(np.sqrt(diagonals.max(axis=(0, 2))[:, None]))
+    def scales(self, x: PETSc.Vec) -> np.ndarray:
+        """Roots of the largest diagonals of the second derivative on each element at a state: (cells, 1, size)."""
+        diagonals = abs(np.diagonal(self._matrices(x), axis1=-2, axis2=-1))
+        return np.asarray(np.sqrt(diagonals.max(axis=1, keepdims=True)))
 
     def margin(self, x: PETSc.Vec, scales: np.ndarray) -> float:
-        """Least eigenvalue over the whole rod at ``x``, in units of the ``scales`` of states nearby: smooth."""
-        return self.margins([x], scales)[0]
-
-    def margins(self, states: Sequence[PETSc.Vec], scales: np.ndarray) -> list[float]:
-        """The same at several states."""
-        units, comm = scales[..., None] * scales[..., None, :], self.system.comm
-        least = np.linalg.eigvalsh(np.stack([self._matrices(x) for x in states]) / units)[..., 0]
-        mine: list[float] = least.min(axis=(1, 2), initial=1.0).tolist()
-        return mine if comm.size == 1 else np.min(comm.allgather(mine), axis=0).tolist()
+        """Least eigenvalue over the whole rod at ``x``, in units of the ``scales`` of a state nearby: smooth."""
+        least = np.linalg.eigvalsh(self._matrices(x) / (scales[..., None] * scales[..., None, :]))[..., 0]
+        return float(self.system.comm.allreduce(float(least.min(initial=1.0)), op=MPI.MIN))
 
     def _matrices(self, x: PETSc.Vec) -> np.ndarray:
         """Second derivatives by element of this rank and place on it, symmetric, (cells, places, size, size)."""

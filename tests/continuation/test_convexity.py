@@ -52,53 +52,26 @@ def test_a_search_where_it_is_lost() -> None:
     assert any("near P = 1.5: not followed, the stored energy is not convex there" in note for note in diagram.notes)
 
 
-def narrow(x: Any, width: float) -> Energy:
-    """Convex but where ``x(c)`` is nearer to zero than the ``width``."""
-    return lambda v, k, c: bending_and_twist(k, (x(c) ** 2 - width**2, 2.0, 1.0))
-
-
 @pytest.mark.ranks
-@pytest.mark.few(1)
-@pytest.mark.parametrize("width", [0.02, pytest.param(0.003, marks=pytest.mark.alone)])
-def test_convexity_lost_and_regained_within_one_step(width: float) -> None:
-    plan = Plan(depth=0, error_bars=False, steps=StepControl(largest=0.1))
-    (branch,) = trace(rod(narrow(lambda c: 1.0 - c.P, width)), MESH, plan)
-    assert branch.ended == f"the stored energy is not convex any more at P = {1 - width:.6g}"
-    assert branch.points[-1].load < 1 - width < 1 + width < branch.points[-1].load + 0.2
-
-
-@pytest.mark.ranks
-@pytest.mark.few(1)
-@pytest.mark.parametrize("width", [0.1, pytest.param(0.01, marks=pytest.mark.alone)])
-def test_a_state_that_passes_a_dent_of_the_energy_within_one_step(width: float) -> None:
+def test_a_state_that_comes_to_a_dent_of_the_energy(width: float = 0.1) -> None:
     """A rod under tension, whose stretch jumps: ``W'' = 10 - 11/(1 + x^2)^(3/2)`` with ``x = (v - 1.3)/width``."""
 
     def dented(v: Any, k: Any, c: Any) -> Any:
         e = v[2] - 1
         return bending_and_twist(k, (1.0, 2.0, 1.0)) + 5 * e**2 - 11 * width * ufl.sqrt((e - 0.3) ** 2 + width**2)
 
-    ends = clamped(), free(force=lambda c: (0.0, 0.0, c.P))
-    (branch,) = trace(rod(dented, (0.0, 10.0), ends=ends, rod="unshearable"), MESH, Plan(depth=0, error_bars=False))
+    ends, plan = (clamped(), free(force=lambda c: (0.0, 0.0, c.P))), Plan(depth=0, error_bars=False)
+    (branch,) = trace(rod(dented, (0.0, 10.0), ends=ends, rod="unshearable"), MESH, plan)
     assert branch.ended.startswith("the stored energy is not convex any more at P = ")
     v = 1.3 - width * (1.1 ** (2 / 3) - 1) ** 0.5
     e = v - 1
     assert branch.points[-1].load < 10 * e - 11 * width * (e - 0.3) / ((e - 0.3) ** 2 + width**2) ** 0.5 + 1e-6
 
 
-@pytest.mark.parametrize(
-    ("energy", "until"),
-    [
-        (lambda v, k, c: softening(v, k, Constants(P=c.P / 30)), 30.0),
-        (narrow(lambda c: 1 - c.P / 29.7, 0.003), 29.6109),
-    ],
-)
-def test_a_sweep(energy: Energy, until: float) -> None:
-    """Of a stiffness that vanishes, and of one that is negative between two loads only.
-
-    Of ten times the follower force there would be sixty critical loads where the stiffness nears zero.
-    """
+def test_a_sweep(until: float = 30.0) -> None:
+    """Of ten times the follower force there would be sixty critical loads where the stiffness nears zero."""
     scene = rod(
-        energy,
+        lambda v, k, c: softening(v, k, Constants(P=c.P / until)),
         (0.0, 60.0),
         ends=(clamped(), free(follower=lambda c: (0.0, 0.0, -1e-3 * c.P))),
         inertia=Inertia(rho_A=lambda c: 1.0, rho_I=lambda c: (0.0, 0.0, 0.0)),
@@ -121,5 +94,6 @@ def test_convexity_lost_in_the_step_to_zero_stretch(loss: float = 3.99) -> None:
     )
     steps = StepControl(first=0.25, largest=0.25)
     (branch,) = trace(scene, MESH, Plan(depth=0, error_bars=False, steps=steps))
-    assert branch.ended == f"the stored energy is not convex any more at P = {loss:g}"
-    assert branch.points[-1].load < loss
+    reason, _, where = branch.ended.rpartition(" = ")
+    assert reason == "the stored energy is not convex any more at P"
+    assert branch.points[-1].load < loss < float(where) <= 4.0
