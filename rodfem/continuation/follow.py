@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from math import copysign, inf
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from rodfem import compat
@@ -26,7 +25,7 @@ from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver, Step
 from rodfem.continuation.curves import ALIGNED, ROWS, lagrange, predict
 from rodfem.errors import ConvergenceError, InputError, many
-from rodfem.fem.newton import VIOLATED, violation
+from rodfem.fem.newton import violation
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
 from rodfem.problem.arguments import convert, finite, real, whole
@@ -264,20 +263,11 @@ def defect(system: System, rows: Sequence[Point]) -> float:
 
 
 def require_equilibrium(solver: BranchSolver, point: Point) -> None:
-    """Raise :class:`ConvergenceError` for a row that is no equilibrium of unit quaternions; collective."""
-    system, x = solver.system, point.x
-    where = f"At {system.scene.load} = {point.load:.8g}"
-    stretched = 0.0
-    if "q" in system.fields.dofs:
-        norms = np.sum(system.at(x).values("q") ** 2, axis=-1)
-        stretched = system.fields.comm.allreduce(float(abs(norms - 1.0).max(initial=0.0)), op=MPI.MAX)
-    if not stretched <= VIOLATED:
+    """Raise :class:`ConvergenceError` for a row that is no equilibrium; collective."""
+    system = solver.system
+    system.set_phase(point.x)
+    if worst := violation(system, point.x):
         raise ConvergenceError(
-            f"{where} a quaternion has a squared norm that differs from one by {stretched:.1e}: use more elements or "
-            "smaller steps."
-        )
-    system.set_phase(x)
-    if worst := violation(system, x):
-        raise ConvergenceError(
-            f"{where} the state is no equilibrium: its equations are violated by {worst:.1e}; use smaller steps."
+            f"At {system.scene.load} = {point.load:.8g} the state is no equilibrium: its equations are violated by "
+            f"{worst:.1e}; use smaller steps."
         )
