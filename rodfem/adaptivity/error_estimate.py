@@ -251,8 +251,7 @@ class Enriched:
         x, k = self.transfer(point.x, state=True), special.multiplicity
         modes = [self.transfer(v, state=False) for v in (*special.null_vectors, *special.nearby)]
         orthonormalize(modes, metric)
-        opposite = special.test_function == "mu" and special.negative_before == special.negative_after
-        found = SingularSystem(solver, modes, 1 if opposite else k, fold=special.kind == FOLD).solve(x)
+        found = SingularSystem(solver, modes, k, fold=special.kind == FOLD).solve(x)
         if found is None:
             raise ConvergenceError(f"the richer discretisation has no such point near load {point.load:.8g}")
         ordinate, units = solver.shape.ordinate(found.x), solver.units

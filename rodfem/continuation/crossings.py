@@ -73,7 +73,6 @@ class Crossing:
     after: int
     rest: int  # the index at it, but for these
     piece: tuple[Node, Node]
-    width: float  # distance of the first from the last of them
     uneven: float  # their mean rate over the slowest
 
 
@@ -200,7 +199,7 @@ def _passed(a: Node, b: Node, groups: list[list[float]]) -> list[Crossing]:
         own, others, rates = _passing(a, b, group)
         rest, s = a.far + int((others < 0).sum()), a.s + float(np.mean(group)) * h
         uneven = float(abs(rates).mean() / max(abs(rates).min(), TINY))
-        out.append(Crossing(s, own, before, after, rest, (a, b), (group[-1] - group[0]) * h, uneven))
+        out.append(Crossing(s, own, before, after, rest, (a, b), uneven))
     return out
 
 

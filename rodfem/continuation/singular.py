@@ -120,7 +120,6 @@ class SingularState:
     rate: float  # derivative of the eigenvalue along the response
     spread: float  # what several eigenvalues, whose mean vanishes, differ from that
     modes: list[PETSc.Vec]  # of the border, relaxed
-    others: np.ndarray  # the eigenvalues of those that do not vanish
     last: PETSc.Vec  # what Newton's method leaves of the state
     second: float  # the second parameter
     curve: Curve | None  # with two parameters
@@ -404,7 +403,7 @@ class SingularSystem:
         # rounding errors of phi . F, independent and as large as those of phi . S x, a hundred times
         noise = 100.0 * max(rounding(matrix, v, x) for v in null) + 1e-15 * self.inertia.scale  # or all vanish
         curve = self.curve(at, (x, t, share), null, noise)
-        others, soft = at.N.T @ at.G @ at.N, at.Z.T @ at.G @ at.Z
+        soft = at.Z.T @ at.G @ at.Z
         response = combine([at.vectors[1], *at.V], np.array([1.0, *(at.N @ self.rest(at.N, at.G, -at.b[:, 0]))]))
         vectors = [v.copy() for v in null]
         orthonormalize(vectors, self.inertia.metric)
@@ -421,7 +420,6 @@ class SingularSystem:
             at.rows[-1, 1] / k,
             float(np.linalg.norm(soft - np.trace(soft) / k * np.eye(k), 2)),
             modes,
-            np.linalg.eigvalsh(others + others.T) / 2,
             last,
             t,
             curve,

@@ -67,8 +67,6 @@ class Candidate:
     after: int
     negative: int
     length: float  # of the piece
-    crossing: bool = True  # whether eigenvalues pass zero there; else they touch it
-    width: float = 0.0  # distance of several crossings
     uneven: float = 1.0  # mean rate of these over the slowest
 
     @property
@@ -86,9 +84,7 @@ def of_crossing(piece: Piece, crossing: Crossing) -> Candidate:
     before, after, count = crossing.before, crossing.after, crossing.vectors.shape[1]
     near = [i for i in order[count:] if abs(values[i]) < 0.01 * piece.solver.inertia.scale]
     modes = _modes(piece, W, own[:, [*order[:count], *near]])
-    return Candidate(
-        x, slope, modes, count, before, after, crossing.rest, q.s - p.s, width=crossing.width, uneven=crossing.uneven
-    )
+    return Candidate(x, slope, modes, count, before, after, crossing.rest, q.s - p.s, crossing.uneven)
 
 
 def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
@@ -104,7 +100,7 @@ def of_turn(piece: Piece, p: Node, q: Node, s: float) -> Candidate:
     zero = abs(values) < NEARLY_ZERO * solver.inertia.scale
     zero[abs(values).argmin()] = True
     negative, modes = far + int((values[~zero] < 0).sum()), _modes(piece, W, own[:, zero])
-    return Candidate(x, slope, modes, len(modes), p.index, p.index, negative, q.s - p.s, crossing=False)
+    return Candidate(x, slope, modes, len(modes), p.index, p.index, negative, q.s - p.s)
 
 
 def _interpolated(piece: Piece, p: Node, q: Node, s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -119,7 +115,7 @@ def of_miss(piece: Piece, node: Node) -> Candidate:
     knot, index = node.kept, node.index
     values, own = np.linalg.eigh(knot.reduced.H)
     modes = _modes(piece, knot.reduced.W, own[:, [abs(values).argmin()]])
-    return Candidate(knot.x, knot.slope, modes, 1, index, index, index, piece.length, crossing=False)
+    return Candidate(knot.x, knot.slope, modes, 1, index, index, index, piece.length)
 
 
 def _modes(piece: Piece, W: np.ndarray, vectors: np.ndarray) -> list[PETSc.Vec]:
@@ -132,8 +128,7 @@ def _modes(piece: Piece, W: np.ndarray, vectors: np.ndarray) -> list[PETSc.Vec]:
 
 def solved(solver: BranchSolver, at: Candidate, *, fold: bool) -> SingularState | None:
     """The singular state of a candidate; None where there is none near by."""
-    opposite = at.crossing and abs(at.after - at.before) < at.count  # they have no trace that vanishes
-    found = SingularSystem(solver, at.modes, 1 if opposite else at.count, fold=fold).solve(at.x)
+    found = SingularSystem(solver, at.modes, at.count, fold=fold).solve(at.x)
     if found is not None and solver.system.distance(found.x, at.x) > STRAYED * at.length:
         return None
     return found
@@ -152,12 +147,6 @@ def special_point(piece: Piece, at: Candidate, found: SingularState, *, fold: bo
     special = SpecialPoint(FOLD if fold else BRANCH_POINT, point, at.before, at.after, left, null, nearby, coupling)
     special.unfolding = float("nan") if fold else found.size
     special.test_function = "slope" if fold else "mu"
-    more = at.count - len(null)
-    if more:  # opposite crossings, of which one was solved for
-        special.null_vectors, special.nearby = null + nearby[:more], nearby[more:]
-        point.zero += more
-        apart = np.sort(abs(found.others))[more - 1] / abs(found.rate)
-        special.located_to += 2 * max(apart, at.width * abs(system.scalar(at.slope)))
     return special
 
 
