@@ -418,8 +418,8 @@ def traced(scene: Scene, discretization: Discretization, plan: Plan, observer: O
         with clock("setup"):
             mesh = _mesh(scene, discretization, plan, comm)
             found = Solver(scene, mesh, comm, spectrum=plan.spectrum, clock=clock).equilibria
-            if plan.accuracy is None and (doubt := check_start(found, plan.load_range(scene))):
-                recorder.warn(doubt)
+            if plan.accuracy is None:
+                check_start(found, plan.load_range(scene))
         if stressed := misfit(scene, plan.load_range(scene)[0]):
             recorder.note(stressed)
         recorder.system(found.system, plan.accuracy)

@@ -83,24 +83,13 @@ def check_index(solver: BranchSolver, load: float, index: int) -> None:
         )
 
 
-def check_start(solver: BranchSolver, span: tuple[float, float]) -> str:
-    """Why indices may be the mesh's at the ends of a ``span``: that of the scene's start is another on a finer mesh."""
-    system, mesh = solver.system, solver.system.fields.discretization
-    nodes = mesh.elements * mesh.degree
+def check_start(solver: BranchSolver, span: tuple[float, float]) -> None:
+    """Raise :class:`Overfull` where the mesh cannot hold the index of the scene's start at an end of a ``span``."""
     for load in span if solver.conservative else ():
         index = _index(solver, load)
         if index is None:
             break
         check_index(solver, load, index)
-        if 8 * index > nodes:
-            there = _index(solver.on_mesh(mesh.finer(2)), load)
-            if there not in (None, index):
-                return (
-                    f"At {system.scene.load} = {load:g} the index of the first state is {index} on {mesh.elements} "
-                    f"elements and {there} on {2 * mesh.elements}: indices may be the mesh's; use more elements or a "
-                    "higher degree."
-                )
-    return ""
 
 
 def _index(solver: BranchSolver, load: float) -> int | None:
