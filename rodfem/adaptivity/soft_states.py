@@ -34,7 +34,7 @@ from rodfem.continuation.arc import STEADY, stepped
 from rodfem.continuation.branch import Branch, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.curves import VERTICAL
-from rodfem.continuation.kinds import FOLD, NUMBER
+from rodfem.continuation.kinds import NUMBER
 from rodfem.continuation.observer import Remark
 from rodfem.errors import ConvergenceError
 from rodfem.fem.newton import TOLERANCE
@@ -275,9 +275,6 @@ class SoftRows:
                 self._of(point.mesh).examine(point, fixed_load=False, compare=compare, family=family)
         if compare:
             self._leave_out_doubtful(branch, family=family)
-        for fold in branch.special:
-            if fold.kind == FOLD and fold.multiplicity == 1:
-                _change_at_fold(fold, branch.points)
 
     def _examine_given(self, branch: Branch, family: bool) -> bool:
         """The same at loads asked for, at ends and events; whether one is undecided, or not on the richer mesh."""
@@ -371,13 +368,3 @@ def _open(rows: Sequence[Point], number: int) -> bool:
 def _bounds(rows: Sequence[Point]) -> tuple[float, float]:
     """Greatest of the lower bounds of the index at some ``rows``, and least of the upper ones."""
     return max((p.negative for p in rows), default=0), min((p.negative + p.undecided for p in rows), default=inf)
-
-
-def _change_at_fold(fold: SpecialPoint, rows: Sequence[Point]) -> None:
-    """Give a simple fold, where a count has one index on both sides, those of the nearest ``rows`` decided."""
-    here = fold.point.arclength
-    decided = [p for p in rows if not p.undecided and p.arclength != here]
-    after = sum(p.arclength < here for p in decided)
-    both = [p.negative for p in decided[max(after - 1, 0) : after + 1]]
-    if fold.negative_before == fold.negative_after and len(both) == 2 and abs(both[0] - both[1]) == 1:
-        fold.negative_before, fold.negative_after = both

@@ -7,7 +7,7 @@ proportion to the distance from there follow the bend of either branch, however 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from itertools import chain
@@ -47,9 +47,7 @@ RISE = 1e-3  # part of an eigenvalue by which rows on both sides exceed a least 
 HALVINGS = 0, 6, 36
 """Bisections after which a mode that passes zero is among those nearest zero: none in most steps, many next to dozens
 of softer ones."""
-PATIENCE = 4  # rows with an eigenvalue near zero after which it is taken to stay zero
-ASIDE = 0.02  # distance of a regular state from a singular one at the end of a piece, over the piece
-SHORTER, PARTS = 2, 8  # how many times steps are made shorter about one place of a branch, and by what factor
+ASIDE = 0.02  # distance of a regular state from a singular one in a piece, over the piece
 
 
 LEAST = 1e-6  # least bound of a step next to a gap
@@ -74,10 +72,9 @@ class SpecialSearch:
     def __init__(self, meshes: Meshes, observer: Observer) -> None:
         self.meshes, self.gaps, self.observer = meshes, list[Gap](), observer
         self.undecided = 0
-        self._open: list[Point] = []
         self._before: Point | None = None
         self._nearest = -inf
-        self._short: list[tuple[float, float, float]] = []  # from one arclength to another steps of at most this length
+        self._short = 0.0, -inf  # largest step, up to an arclength
         self._condensation = cache(lambda mesh: Condensation(meshes.solvers[mesh].inertia))
         self._phi: np.ndarray | None = None
         self._made = -1, 0  # mesh of the border, and number of phase conditions there
@@ -86,70 +83,40 @@ class SpecialSearch:
 
     def begin(self, first: Point, short: float = 0.0, until: float = -inf) -> None:
         """Begin a branch at its last row so far, with steps of at most ``short`` up to the arclength ``until``."""
-        self._short = [(-inf, until, short)]
+        self._short = short, until
         self.undecided, self._nearest, self._before = first.zero, -inf, None
         self._known.clear()
 
-    def resume(self, history: Sequence[Point]) -> None:
-        """Go on from the last row of a branch, up to which everything has been found."""
-        self._open = [history[-1]]
-
-    @property
-    def settled(self) -> float:
-        """Arclength of the row up to which everything has been found: those after it are singular."""
-        return self._open[0].arclength
-
     def reach(self, point: Point) -> float:
-        """Largest step from a point: near gaps, and up to and in pieces that are to be resolved, short ones."""
-        s = point.arclength
-        ahead = [max(largest, since - s) for since, until, largest in self._short if s < until]
-        return min([max(self._from_gap(point, self.meshes.solvers[point.mesh]) / 4, LEAST), *ahead])
+        """Largest step from a point: short ones near gaps, and at first."""
+        short, until = self._short
+        largest = max(self._from_gap(point, self.meshes.solvers[point.mesh]) / 4, LEAST)
+        return min(largest, short) if point.arclength < until else largest
 
     def _from_gap(self, point: Point, solver: BranchSolver) -> float:
         """Distance of a point from the nearest gap."""
         known = (solver.interpolated(gap.point).x for gap in self.gaps)
         return min((solver.system.distance(point.x, x) for x in known), default=inf)
 
-    def _shorten(self, a: Point, b: Point) -> None:
-        """Ask for short steps from ``a`` to beyond ``b``, unless they are short already."""
-        first, last = a.arclength, b.arclength
-        if sum(-inf < since < last and first < until for since, until, _ in self._short) < SHORTER:
-            self._short.append((first, 2 * last - first, (last - first) / PARTS))
-            raise Unresolved
-
-    def advance(self, b: Point) -> list[SpecialPoint]:
-        """Special points that the row ``b`` shows, in order; a singular row, of no index, waits for the next one."""
-        settled = self._open[0]
-        if settled.mesh != b.mesh:
-            self._open = [self.meshes.solvers[b.mesh].interpolated(settled)]
-        try:
-            self._open.append(b)
-            self._prepare(self._open[0])
-            regular = self._reduced(b).zero <= min(self._reduced(p).zero for p in self._open)  # to working accuracy
-            return self._points() if regular or len(self._open) > PATIENCE else []
-        except Unresolved:
-            self._open = [settled]
-            raise
-
-    def rest(self) -> list[SpecialPoint]:
-        """Special points among the last rows of a branch that only its end shows: those of singular rows."""
-        return self._points(ended=True) if len(self._open) > 1 else []
-
-    def overshoot(self, a: Point, b: Point) -> list[SpecialPoint]:
-        """Special points between a row and a point past the end of its branch."""
-        return self._search(a, b, ended=True)
-
-    def _points(self, *, ended: bool = False) -> list[SpecialPoint]:
-        a, b = self._open[0], self._open[-1]
-        found = self._search(a, b, ended=ended)
-        self._open, self._before = [b], a
+    def advance(self, a: Point, b: Point) -> list[SpecialPoint]:
+        """Special points from a row to the next one, in order."""
+        a = self.meshes.solvers[b.mesh].interpolated(a)
+        found = self._search(a, b)
+        self._before = a
         return found
+
+    def beyond(self, a: Point, b: Point) -> list[SpecialPoint]:
+        """Special points between a row and a point past the end of its branch; none where steps are too long."""
+        try:
+            return self.advance(a, b)
+        except Unresolved:
+            return []
 
     def _reduced(self, row: Point) -> ReducedStiffness:
         if id(row) not in self._known:
             assert self._phi is not None and row.tangent is not None
             self._known[id(row)] = row, self._condensation(row.mesh).at(row.x, row.tangent, self._phi)
-            if len(self._known) > PATIENCE + 2:
+            if len(self._known) > 6:  # two are those of a piece, one is before it
                 del self._known[next(iter(self._known))]
         return self._known[id(row)][1]
 
@@ -212,32 +179,24 @@ class SpecialSearch:
             p, q = (middle, q) if middle.index == p.index else (p, middle)
         return q.kept.x
 
-    def _search(self, a: Point, b: Point, *, ended: bool = False) -> list[SpecialPoint]:
-        """Special points between two rows, of which those between are singular."""
+    def _search(self, a: Point, b: Point) -> list[SpecialPoint]:
+        """Special points between two rows."""
         piece, p, q = self._nodes(a, b)
         self.undecided = piece.omissions + piece.solver.system.active_drifts(b.x)
-        margin = ASIDE * (q.s - p.s)
-        p = p if p.kept.reduced.zero <= piece.omissions else piece.solve(p, q, p.s + margin) or p
-        q = q if q.kept.reduced.zero <= piece.omissions or not ended else piece.solve(p, q, q.s - margin) or q
-        out, pieces = self._turning(piece, p, q, ended=ended)
+        p = p if p.kept.reduced.zero <= piece.omissions else piece.solve(p, q, p.s + ASIDE * (q.s - p.s)) or p
+        out, pieces = self._turning(piece, p, q)
         zeros, size = Zeros(piece.solve, piece.solver.inertia.tolerance), self._fourth(piece, p, q)
         for crossing in chain.from_iterable(zeros.crossings(*ends, size) for ends in pieces):
             turns = piece.turn(*crossing.piece) is not None
-            special = self._located(piece, of_crossing(piece, crossing), turns=turns, ended=ended)
+            special = self._located(piece, of_crossing(piece, crossing), turns=turns)
             if special is not None:
                 out.append(special)
             else:
-                self._missing(a, b, ended=ended)
+                self._lost.append((a, b))
         for node in zeros.misses:
-            self._missed(piece, of_miss(piece, node), resolved=ended)
+            self._missed(piece, of_miss(piece, node), resolved=False)
         self._dip(piece, p, q, found=bool(out))
         return sorted(out, key=lambda special: special.point.arclength)
-
-    def _missing(self, a: Point, b: Point, *, ended: bool) -> None:
-        """Ask for shorter steps where a crossing has no singular state, or remember it."""
-        if not ended:
-            self._shorten(a, b)
-        self._lost.append((a, b))
 
     def unlocated(self, branch: Branch) -> Iterator[Remark]:
         """Yield a sentence on each step with a crossing that was not located, on no mesh of the ``branch``."""
@@ -255,13 +214,11 @@ class SpecialSearch:
             self._missed(piece, of_miss(piece, p))
         self._nearest = -inf if found else nearest
 
-    def _turning(
-        self, piece: Piece, p: Node, q: Node, *, ended: bool
-    ) -> tuple[list[SpecialPoint], list[tuple[Node, Node]]]:
+    def _turning(self, piece: Piece, p: Node, q: Node) -> tuple[list[SpecialPoint], list[tuple[Node, Node]]]:
         """The branch point at which the load turns back, if there is one, and the pieces on both sides of it."""
         turn = piece.turn(p, q)
         folded = turn is not None and _turns_in_fold(piece, p, q, of_turn(piece, p, q, turn))
-        found = None if turn is None or folded else self._touch_point(piece, (p, q), turn, ended=ended)
+        found = None if turn is None or folded else self._touch_point(piece, (p, q), turn)
         if found is None:
             return [], [(p, q)]
         (touch, *made), pieces = found, list[tuple[Node, Node]]()
@@ -283,9 +240,7 @@ class SpecialSearch:
         before = piece.node(row.x, row.tangent, self._reduced(row))
         return fourth(p, q, before if before.s < p.s else None)
 
-    def _touch_point(
-        self, piece: Piece, ends: tuple[Node, Node], s: float, *, ended: bool
-    ) -> tuple[SpecialPoint, Node, Node] | None:
+    def _touch_point(self, piece: Piece, ends: tuple[Node, Node], s: float) -> tuple[SpecialPoint, Node, Node] | None:
         """Branch point at which the load turns back, where a side branch ends, and states next to it.
 
         An eigenvalue touches zero there.
@@ -301,14 +256,11 @@ class SpecialSearch:
             self.observer.warn(Remark(why, solver.system.scalar(at.x)))
             return None
         found = None if _turns_in_fold(piece, left, right, at) else solved(solver, at, fold=False)
-        if found is None:
-            return None
-        if found.size > found.noise:
-            self._open_gap(piece, at, found, ended=ended)
+        if found is None or found.size > found.noise:
             return None
         return replace(special_point(piece, at, found, fold=False), test_function="slope"), left, right
 
-    def _located(self, piece: Piece, at: Candidate, *, turns: bool, ended: bool) -> SpecialPoint | None:
+    def _located(self, piece: Piece, at: Candidate, *, turns: bool) -> SpecialPoint | None:
         """The fold or branch point of a crossing; None where there is no singular state."""
         clearly = is_fold(piece.solver, at.x, at.null)
         tried = dict[bool, SingularState | None]()
@@ -317,7 +269,7 @@ class SpecialSearch:
             if found is not None and (fold or found.size <= found.noise):
                 return self._found(piece, at, found, fold=fold)
         branch = tried[False]
-        special = None if branch is None else self._imperfect(piece, at, branch, ended=ended)
+        special = None if branch is None else self._imperfect(piece, at, branch)
         if not clearly and (turns or special is None) and (found := solved(piece.solver, at, fold=True)) is not None:
             return self._found(piece, at, found, fold=True)
         return special
@@ -328,16 +280,18 @@ class SpecialSearch:
             self._missed(piece, at, fold=found)
         return special_point(piece, at, found, fold=fold)
 
-    def _imperfect(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> SpecialPoint:
+    def _imperfect(self, piece: Piece, at: Candidate, found: SingularState) -> SpecialPoint:
         """The branch point at a state whose unfolding parameters are not round-off."""
-        gap = self._open_gap(piece, at, found, ended=ended)
+        gap = self._open_gap(piece, at, found, resolved=False)
         special = special_point(piece, at, found, fold=False)
         if gap is not None:
             special.kind, special.note = IMPERFECT, f"imperfect, unfolding {found.size:.0e}"
         return special
 
-    def _open_gap(self, piece: Piece, at: Candidate, found: SingularState, *, ended: bool) -> Gap | None:
-        """The gap at a singular state whose unfolding parameters are not round-off; steps about a new one are shorter.
+    def _open_gap(self, piece: Piece, at: Candidate, found: SingularState, *, resolved: bool) -> Gap | None:
+        """The gap at a singular state whose unfolding parameters are not round-off.
+
+        Steps about a new one are shorter, unless they have ``resolved`` it.
 
         None where the mesh makes them, which need not have a symmetry of the scene: those of a richer one are smaller.
         """
@@ -349,15 +303,11 @@ class SpecialSearch:
             return None
         point = replace(special.point, x=found.x, load=found.load)
         gap = Gap(point, found, piece.solver.system.distance(at.x, found.x))
-        if not ended and self._add(gap, piece.solver):
+        new = self._from_gap(gap.point, piece.solver) >= LEAST  # else smaller steps have not resolved it
+        self.gaps += [gap] * new
+        if new and not resolved:
             raise Unresolved
         return gap
-
-    def _add(self, gap: Gap, solver: BranchSolver) -> bool:
-        """Add a gap; False where it is known already, so that smaller steps have not resolved it."""
-        new = self._from_gap(gap.point, solver) >= LEAST
-        self.gaps += [gap] * new
-        return new
 
     def _missed(self, piece: Piece, at: Candidate, *, resolved: bool = True, fold: SingularState | None = None) -> None:
         """Look for the branch on the other side where an eigenvalue comes near zero and turns back, or at a ``fold``.
@@ -372,9 +322,7 @@ class SpecialSearch:
             return
         if fold is not None and abs(found.rate * (found.load - fold.load)) >= DIP * solver.inertia.scale:
             return
-        gap = self._open_gap(piece, at, found, ended=resolved)
-        if gap is not None and resolved:
-            self._add(gap, solver)
+        self._open_gap(piece, at, found, resolved=resolved)
 
 
 def _turns_in_fold(piece: Piece, p: Node, q: Node, at: Candidate) -> bool:

@@ -147,16 +147,13 @@ class Tracer:
 
     def _advance(self, branch: Branch, history: list[Point]) -> bool:
         """Append points until the branch ends; False where both are as before a step that was too long."""
-        self.specials.resume(history)
         try:
             for item in follow(self.solver, history, self.plan.steps, (self.low, self.high), self.specials.reach):
                 if isinstance(item, str):
-                    self._rest(branch)
                     raise Ended(item)
                 self._take(branch, history, item)
         except Unresolved:  # the step was too long, or led to another branch: back, to smaller ones
-            branch.cut(self.specials.settled)
-            history[:] = [p for p in history if p.arclength <= self.specials.settled]
+            branch.cut(history[-1].arclength)
             return False
         except Ended as end:
             branch.ended = str(end)
@@ -191,7 +188,6 @@ class Tracer:
         history.append(row)
         self._append(branch, row)
         if last:
-            self._rest(branch)
             raise Ended("closed loop")
 
     def _append(self, branch: Branch, row: Point) -> None:
@@ -204,7 +200,7 @@ class Tracer:
         In an unstretched state eigenvalues vanish, which is no special point of its own.
         """
         with self.solver.system.clock.scope("location"):
-            specials = [] if a is branch.points[0] and branch.parent else self.specials.advance(b)
+            specials = [] if a is branch.points[0] and branch.parent else self.specials.advance(a, b)
             if last == "unstretched":
                 close = located(self.solver, b)
                 specials = [s for s in specials if abs(s.point.load - b.load) > close]
@@ -239,13 +235,6 @@ class Tracer:
             a, b = map(self.solver.interpolated, branch.points)
             self._insert(branch, self._requests(Step(self.solver, a, b, begins=a is branch.points[0])))
 
-    def _rest(self, branch: Branch) -> None:
-        """Insert the special points that only the end of a branch shows."""
-        with self.solver.system.clock.scope("location"):
-            specials = self.specials.rest()
-            self._leave(branch, specials, branch.points[-1])
-            self._insert(branch, specials)
-
     def _insert(self, branch: Branch, specials: list[SpecialPoint]) -> None:
         """Insert special points into a branch, up to one at which it ends."""
         for special in specials:
@@ -267,7 +256,6 @@ class Tracer:
     def _require_convexity(self, branch: Branch, row: Point) -> None:
         """End a branch before a ``row`` at which the stored energy is not convex."""
         if why := self.solver.lost_convexity(row.x):
-            self._rest(branch)
             raise Ended(why)
 
     def _end_at_zero_stretch(self, branch: Branch, a: Point, b: Point) -> NoReturn:
@@ -302,7 +290,8 @@ class Tracer:
         """Insert a branch point on the very end of the range, located on a piece of the branch that goes past it."""
         previous, load = branch.points[-2], last.load + 0.02 * (last.load - sum(self.span) / 2)
         low, high = self.scene.parameters[self.scene.load].admissible
-        if previous.x is last.x or not low < load < high:
+        width = 1e-6 * (self.high - self.low)  # nearer is the last state
+        if previous.x is last.x or not low < load < high or _near(branch.special, last, width):
             return
         with self.solver.system.clock.scope("location"):
             x, outcome = self.solver.at_load(last.x, load, reach=1.0)
@@ -310,9 +299,8 @@ class Tracer:
                 raise ConvergenceError(f"there is no equilibrium at {self.scene.load} = {load:g}")
             s = last.arclength + self.solver.system.distance(last.x, x)
             further = self.solver.point(x, s, self.solver.load_tangent(x, load > last.load), outcome)
-            found = self.specials.overshoot(self.solver.interpolated(previous), further)
-        width = 1e-6 * (self.high - self.low)  # nearer is the last state
-        for special in [s for s in found if s.kind.branches and abs(s.point.load - last.load) < width][:1]:
+            found = self.specials.beyond(previous, further)
+        for special in _near(found, last, width)[:1]:
             if not any(s.point is last for s in branch.special):  # else a load asked for, which stays
                 branch.replace({id(last): special.point})
             branch.insert(special)
@@ -373,3 +361,8 @@ class Tracer:
                     with self.guard(f"No error was estimated at {self.scene.load} = {special.point.load:.8g}"):
                         self.meshes.richer(special.point.mesh).estimate(special)
                 self.control.label(special)
+
+
+def _near(specials: Sequence[SpecialPoint], point: Point, width: float) -> list[SpecialPoint]:
+    """Branch points among some special points whose load is that of a ``point``, but for a ``width``."""
+    return [s for s in specials if s.kind.branches and abs(s.point.load - point.load) < width]

@@ -1,8 +1,7 @@
-"""Branches that close, that go back to shorter steps however often, and that have an image by a symmetry."""
+"""Branches that close, and that have an image by a symmetry."""
 
 from dataclasses import replace
-from math import inf, pi, sqrt
-from types import SimpleNamespace
+from math import pi, sqrt
 from typing import Any
 
 import classics
@@ -12,9 +11,8 @@ from classics import column
 from problem.test_docs import scenes
 
 import rodfem
-from rodfem import Discretization, End, Observer, Ordinate, Plan, Ring, Scene, StepControl, clamped, trace
+from rodfem import Discretization, End, Ordinate, Plan, Ring, Scene, StepControl, clamped, trace
 from rodfem.deflation.symmetries import Mirror
-from rodfem.diagram.special_search import PARTS, SHORTER, SpecialSearch, Unresolved
 from rodfem.output.plot_diagram import figure_of
 
 
@@ -34,25 +32,6 @@ def test_two_states_of_a_twisted_ring_are_joined_at_any_step() -> None:
     assert last.point.ordinate == pytest.approx(2.0, abs=1e-9)
     assert diagram["branch 1"].ended.startswith("meets another branch")
     assert not diagram.warnings
-
-
-def test_steps_are_short_about_pieces_that_are_to_be_resolved_and_not_for_ever() -> None:
-    """A branch that goes back far before a piece does not creep towards it, nor to and fro between two."""
-
-    def row(arclength: float) -> Any:
-        return SimpleNamespace(arclength=arclength, mesh=0)
-
-    meshes = SimpleNamespace(solvers=[None])
-    search, asked = SpecialSearch(meshes, Observer()), 0  # type: ignore[arg-type]
-    for first in (3.0, 5.0) * 10:
-        try:
-            search._shorten(row(first), row(first + 0.2))
-        except Unresolved:
-            asked += 1
-    assert asked == 2 * SHORTER
-    assert search.reach(row(0.5)) == pytest.approx(2.5) and search.reach(row(6.0)) == inf
-    assert search.reach(row(3.1)) == search.reach(row(5.1)) == pytest.approx(0.2 / PARTS)
-    assert search.reach(row(3.5)) == pytest.approx(1.5)
 
 
 PLANAR = replace(
