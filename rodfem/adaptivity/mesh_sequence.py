@@ -147,8 +147,7 @@ class AccuracyControl:
         self.units = meshes.solvers[0].units
         self.accuracy = meshes.accuracy or np.inf
         self.checked: tuple[float, float, int] | None = None  # indicator and error of a point, and the points since
-        self.place, self.error, self.tries = -np.inf, np.inf, 0
-        self.accepted: list[float] = []  # arclengths of the last two rows since then
+        self.place, self.tries = -np.inf, 0
         self.excused = -np.inf
 
     def row(self, point: Point, solver: BranchSolver) -> None:
@@ -161,14 +160,12 @@ class AccuracyControl:
             point.estimate = error * max(1.0, indicator / before)
             if indicator < GROWN * before or 10 * point.estimate < self.accuracy:
                 self.checked = before, error, since + 1
-                self.accepted = [*self.accepted[-1:], point.arclength]
                 return
         with solver.system.clock.scope("error bars"):
             point.estimate = self._computed(point)
         self.checked = max(indicator, TINY), point.estimate, 0
         if point.estimate * GROWN > self.accuracy and point.arclength > self.excused:
             raise TooCoarse(point, point.estimate)
-        self.accepted = [*self.accepted[-1:], point.arclength]
 
     def special(self, special: SpecialPoint) -> None:
         """Estimate the errors of a special point; raises :class:`TooCoarse` where another mesh may help."""
@@ -219,20 +216,14 @@ class AccuracyControl:
 
     def another(self, trouble: TooCoarse, observer: Observer) -> BranchSolver | None:
         """Solver on a mesh for the state that was too coarse; None, which is reported, where no mesh helps there."""
-        point, helps = trouble.point, True
-        if abs(point.arclength - self.place) < NEAR:
-            self.tries += 1
-            passed = any(self.place <= row < point.arclength for row in self.accepted)  # that place was resolved
-            helps = passed or not isfinite(trouble.error) or trouble.error < 0.5 * self.error
-        else:
-            self.tries = 0
-        self.place, self.error, self.checked, self.accepted = point.arclength, trouble.error, None, []
-        if helps and self.tries < TRIES and len(self.meshes.solvers) < MOST:
+        point = trouble.point
+        self.tries = self.tries + 1 if abs(point.arclength - self.place) < NEAR else 0
+        self.place, self.checked = point.arclength, None
+        if self.tries < TRIES and len(self.meshes.solvers) < MOST:
             return self.meshes.raised(trouble, self.tries)
         self.excused = point.arclength + NEAR
-        why = f"{self.tries + 1} finer meshes did not do" if helps else "finer meshes do not lower the error"
-        if len(self.meshes.solvers) >= MOST:
-            why = f"{MOST} meshes are the most"
+        many = len(self.meshes.solvers) >= MOST
+        why = f"{MOST} meshes are the most" if many else f"{self.tries + 1} finer meshes did not do"
         words = f"The accuracy is not reached near load {point.load:.6g} ({trouble}): {why}."
         observer.warn(Remark(words, point.load))
         return None
