@@ -12,7 +12,6 @@ shows that image where its ordinate has the opposite sign.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -27,7 +26,7 @@ from rodfem.diagram.events import Step
 from rodfem.errors import ConvergenceError
 from rodfem.problem.units import Units
 from rodfem.stability.inertia import NULL, Factored, Index
-from rodfem.tolerances import LOCATED, NEGLIGIBLE, SAME_SPECIAL, SAME_STATE, unit
+from rodfem.tolerances import NEGLIGIBLE, SAME_SPECIAL, SAME_STATE, unit
 
 CARRIED, OTHER = 1e-3, 1e-6
 """Distance of a state's image from another state, over that of the two, below which the one is the other; difference of
@@ -53,22 +52,9 @@ def neighbours(a: Point, b: Point, units: Units, steps: float = 2.0) -> bool:
     return close and abs(a.energy - b.energy) <= reach * unit(a.energy, one=units.energy)
 
 
-def are_images(solver: BranchSolver, special: SpecialPoint, a: Point, b: Point, alike: Alike) -> bool:
-    """Whether the first points ``a``, ``b`` of branches that leave ``special`` in opposite ways are mirror images."""
-    if not equivalent(a, b, solver.units):
-        # one that turns at a fold just next to the branch point is there as near to the other side as round-off
-        load, width = special.point.load, LOCATED * special.located_to
-        if min(a.load, b.load) < load - width and max(a.load, b.load) > load + width:
-            return False
-        a, b = sorted((a, b), key=lambda p: abs(p.load - load))
-        try:
-            there = Arc(solver, replace(special.point, arclength=0.0, tangent=None), b).at_load(a.load)
-        except ConvergenceError:  # the load is none of those between
-            return False
-        if not alike(a, there, SAME_STATE):
-            return False
-        b = there
-    if (a.negative, a.zero) != (b.negative, b.zero):
+def are_images(solver: BranchSolver, a: Point, b: Point) -> bool:
+    """Whether first points ``a``, ``b`` of branches that leave a point in opposite ways are mirror images."""
+    if not equivalent(a, b, solver.units) or (a.negative, a.zero) != (b.negative, b.zero):
         return False
     if a.mesh == b.mesh and not _as_stable(solver.inertia.at, a, b):
         return False

@@ -234,7 +234,7 @@ class Explorer(Tracer):
         """Whether a branch that leaves is new, and no mirror image of one of the ``firsts`` that leave there."""
         assert branch.parent is not None
         special, first = parent.special[branch.parent[1]], branch.points[1]
-        image = next((p for p in firsts if are_images(self.solver, special, p, first, self.alike)), None)
+        image = next((p for p in firsts if are_images(self.solver, p, first)), None)
         if image is not None:
             if image.mesh == first.mesh == self.solver.mesh:
                 self._other_side(self.branches[before:], special, image, first)

@@ -12,13 +12,13 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 31617,
+    "lines of Python": 31378,
     "files of Python": 147,
     "lines of C": 1026,
-    "module constants with a number": 248,
+    "module constants with a number": 244,
     "functions of a complexity above 10": 0,
     "functions of six parameters or more": 18,
-    "places that warn": 22,
+    "places that warn": 21,
     "files that import internals of UFL and FFCx": 2,
 }
 DECISIONS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.ExceptHandler, ast.IfExp, ast.Assert, ast.match_case)
