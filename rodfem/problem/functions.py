@@ -109,7 +109,7 @@ def guarded(what: str, function: Any, role: Role) -> Callable[..., Any]:
     def call(*arguments: Any) -> Any:
         silent, LOG_OF_UFL.disabled = LOG_OF_UFL.disabled, True  # what it prints is in what it raises
         try:
-            value = function(*arguments) if role.placed else function(*map(Placeless, arguments))
+            value = function(*arguments)
             return in_floats(value) if role.returns is None else role.returns(value)
         except UnnamedError as trouble:
             raise SceneError(f"The {what} {trouble}") from None
@@ -218,19 +218,6 @@ class Constants(SimpleNamespace):
 
 
 OfPlace = Callable[[Place, Constants], Any]
-
-
-class Placeless:
-    """Constants without the arclength: a function of ``c.s`` at an end would be one along the rod under an integral."""
-
-    def __init__(self, c: Any) -> None:
-        self._constants = c
-
-    def __getattr__(self, name: str) -> Any:
-        """Constant of a ``name``; raises :class:`UnnamedError` for the arclength."""
-        if name == "s":
-            raise UnnamedError("asks for the arclength c.s, but does not vary along the rod: write the number.")
-        return getattr(self._constants, name)
 
 
 class CheckedPlace(SimpleNamespace):

@@ -176,6 +176,9 @@ class _Trial:
                 f"its constants, at {load} = {vars(there)[load]:g}: do not compare constants by ==, in or if, nor use "
                 f"them as keys; write ufl.conditional(ufl.eq(c.{name}, 1), ..., ...)."
             )
+        if not self.role.placed and "c.s" in self.names:
+            words = "asks for the arclength c.s, but does not vary along the rod: write the number."
+            raise SceneError(f"The {self.what} {words}")
 
     def _found(self) -> Iterator[tuple[float, float, Constants]]:
         """Values of expression and function, nan if UFL has none, inf if undefined, and the constants there."""
