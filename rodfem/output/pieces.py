@@ -58,10 +58,9 @@ def pieces_of(branch: Branch) -> list[Piece]:
     rows = len(columns["load"])
     known = {row: sides for row, *sides in _indices(branch)}
     kink, undecided = columns.get("kink") or [""] * rows, columns.get("undecided") or [0] * rows
-    off, space, steps = _from_neighbours(columns["negative"], kink), _in_space(branch), []
+    own, space, steps = columns["negative"], _in_space(branch), []
     for a, b in pairwise(range(rows)):
         on = kink[a] if kink[b] else ""
-        own = columns["negative"] if on else off
         _, after = known.get(a, (None, None))
         before, _ = known.get(b, (None, None))
         least, more = _index([(after, own[a], undecided[a]), (before, own[b], undecided[b])])
@@ -115,14 +114,6 @@ def _neighbours(columns: Mapping[str, Any], point: Mapping[str, Any]) -> Iterato
             if abs(loads[other] - loads[row]) > (bar if undecided and undecided[other] else located):
                 break
             yield other, point[f"negative_{side}"], point[f"negative_{side}"]
-
-
-def _from_neighbours(negative: list[int], kink: list[str]) -> list[int]:
-    """Index of each row; of one on a kink, where it is that of one side, that of the next row off the kink."""
-    negative, rows = list(negative), range(len(kink))
-    for a, b in (*pairwise(rows), *pairwise(reversed(rows))):
-        negative[a] = negative[b] if kink[a] and not kink[b] else negative[a]
-    return negative
 
 
 def _in_space(branch: Branch) -> list[int]:
