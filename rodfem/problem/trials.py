@@ -70,6 +70,9 @@ def check_functions(scene: Scene) -> None:
     """Raise :class:`SceneError` for a function of a scene that is wrong with numbers, or another as an expression."""
     for trial in _trials(scene):
         trial.compare()
+        if not trial.role.placed and "c.s" in trial.names:
+            words = "asks for the arclength c.s, but does not vary along the rod: write the number."
+            raise SceneError(f"The {trial.what} {words}")
 
 
 def expressions_of(scene: Scene) -> Iterator[Any]:
@@ -176,9 +179,6 @@ class _Trial:
                 f"its constants, at {load} = {vars(there)[load]:g}: do not compare constants by ==, in or if, nor use "
                 f"them as keys; write ufl.conditional(ufl.eq(c.{name}, 1), ..., ...)."
             )
-        if not self.role.placed and "c.s" in self.names:
-            words = "asks for the arclength c.s, but does not vary along the rod: write the number."
-            raise SceneError(f"The {self.what} {words}")
 
     def _found(self) -> Iterator[tuple[float, float, Constants]]:
         """Values of expression and function, nan if UFL has none, inf if undefined, and the constants there."""

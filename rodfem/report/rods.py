@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from rodfem.errors import InputError
-from rodfem.modes.modes import RIGID, SYMMETRY, Few, exponent, load_modes, rows_with_modes, typical_of
+from rodfem.modes.modes import RIGID, SYMMETRY, Few, Modes, exponent, load_modes, rows_with_modes, typical_of
 from rodfem.output.glyphs import POINT, Look, body_of, glyphs_of, profile_of
 from rodfem.output.pieces import typical_state
 from rodfem.output.plot_diagram import is_traced
@@ -28,7 +28,7 @@ from rodfem.problem.quaternions import directors
 from rodfem.problem.setting import CONSTRAINTS, FOUNDATION, SUPPORTS, Setting
 from rodfem.problem.setting import read as read_setting
 from rodfem.report.branches import branch_data, packed
-from rodfem.tolerances import SAME_EIGENVALUE, SAME_SPECIAL
+from rodfem.tolerances import SAME_SPECIAL
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,6 @@ GROWTH = 1e-9  # real part of the root of -mu, relative to it, above which a mod
 ZERO = 1e-7  # a force or moment below this, relative to the natural force or moment, is the error of Newton's method
 OUTLINE, STRIPE = np.linspace(-np.pi, np.pi, 29)[:-1], np.linspace(-0.3, 0.3, 5)
 """Angles from d1 of the outline of a cross-section, and of the stripe that marks d1."""
-SMALL = 1e-3  # share of the greatest eigenvalue below which differences of eigenvalues are relative to this share
 LEAST, BUDGET = 49, 40_000  # stations of a state at least, and of all together: about 6 MB of the page
 
 
@@ -207,29 +206,17 @@ class DrawnMode(NamedTuple):
 
 
 def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[DrawnMode]:
-    """Modes of one state in ascending order, symmetries last: those with error bars, then others that are typical."""
-    shown: list[DrawnMode] = []
-    if path is not None:
-        modes = load_modes(path, *place)
-        each = zip(modes.value, modes.error, modes.motion, modes.displacement, modes.rotation, strict=True)
-        shown += [DrawnMode(complex(mu), float(error), motion, modes.s, u, w) for mu, error, motion, u, w in each]
-    shown += [] if typical is None else _others(typical, s, [mode.value for mode in shown])
+    """Modes of one state in ascending order, symmetries last: those with error bars, or else the typical ones."""
+    modes: Modes | Few | None = typical if path is None else load_modes(path, *place)
+    if modes is None:
+        return []
+    s, errors = (modes.s, modes.error) if isinstance(modes, Modes) else (s, np.full(len(modes.value), np.nan))
+    each = zip(modes.value, errors, modes.motion, modes.displacement, modes.rotation, strict=True)
+    shown = [DrawnMode(complex(mu), float(error), motion, s, u, w) for mu, error, motion, u, w in each]
     shown.sort(key=lambda mode: (mode.motion in (SYMMETRY, RIGID), mode.value.real))
     others = [mode for mode in shown if mode.motion != SYMMETRY]
     vanish = sorted(others, key=lambda mode: abs(mode.value))[: max(zeros - (len(shown) - len(others)), 0)]
     return [mode._replace(zero=any(mode is other for other in vanish)) for mode in shown]
-
-
-def _others(typical: Few, s: Floats, known: Sequence[complex]) -> list[DrawnMode]:
-    """Modes that a run has recorded, but those with eigenvalues that are ``known``; these have symmetries, too."""
-    least = SMALL * abs(typical.value).max(initial=0.0)
-    each = zip(typical.value, typical.motion, typical.displacement, typical.rotation, strict=True)
-    return [
-        DrawnMode(complex(mu), np.nan, motion, s, u, w)
-        for mu, motion, u, w in each
-        if not (known and motion == SYMMETRY)
-        and not any(abs(x - mu) <= SAME_EIGENVALUE * max(abs(mu), least) for x in known)
-    ]
 
 
 def motions_of(

@@ -12,11 +12,11 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 31359,
+    "lines of Python": 31346,
     "files of Python": 147,
     "lines of C": 1026,
-    "module constants with a number": 244,
-    "functions of a complexity above 10": 1,
+    "module constants with a number": 243,
+    "functions of a complexity above 10": 0,
     "functions of six parameters or more": 18,
     "places that warn": 21,
     "files that import internals of UFL and FFCx": 2,
