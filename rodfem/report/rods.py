@@ -80,9 +80,9 @@ def _moving(branch: Mapping[str, Any], shapes: Shapes, group: Any, path: Path, l
     typical = {each.row: each for each in typical_of(group)}
     exact = {row for other, row in rows_with_modes(path) if other == name}
     for row in sorted({*typical, *exact} & {*range(len(shapes.r))}):
-        few, nodes = getattr(typical.get(row), "found", None), group["s"][row]
-        if shown := modes_of(path if row in exact else None, (name, row), few, nodes[np.isfinite(nodes)], zeros[row]):
-            shown = [mode._replace(rates=bool(branch.get("rates"))) for mode in shown]
+        found, nodes = load_modes(path, name, row) if row in exact else typical[row].found, group["s"][row]
+        if found is not None:
+            shown = modes_of(found, nodes[np.isfinite(nodes)], zeros[row], rates=bool(branch.get("rates")))
             modes[row] = motions_of(shown, shapes, row, read_setting(group, row), look)
     missed = filter(attrgetter("trouble"), typical.values())
     return {"modes": modes, "missed": dict(map(attrgetter("row", "trouble"), missed))}
@@ -205,14 +205,11 @@ class DrawnMode(NamedTuple):
     rates: bool = False
 
 
-def modes_of(path: Path | None, place: tuple[str, int], typical: Few | None, s: Floats, zeros: int) -> list[DrawnMode]:
-    """Modes of one state in ascending order, symmetries last: those with error bars, or else the typical ones."""
-    modes: Modes | Few | None = typical if path is None else load_modes(path, *place)
-    if modes is None:
-        return []
-    s, errors = (modes.s, modes.error) if isinstance(modes, Modes) else (s, np.full(len(modes.value), np.nan))
-    each = zip(modes.value, errors, modes.motion, modes.displacement, modes.rotation, strict=True)
-    shown = [DrawnMode(complex(mu), float(error), motion, s, u, w) for mu, error, motion, u, w in each]
+def modes_of(found: Modes | Few, s: Floats, zeros: int, *, rates: bool) -> list[DrawnMode]:
+    """Modes of one state at its nodes ``s`` in ascending order, symmetries last."""
+    errors = getattr(found, "error", np.full(len(found.value), np.nan))
+    each = zip(found.value, errors, found.motion, found.displacement, found.rotation, strict=True)
+    shown = [DrawnMode(complex(mu), float(error), motion, s, u, w, rates=rates) for mu, error, motion, u, w in each]
     shown.sort(key=lambda mode: (mode.motion in (SYMMETRY, RIGID), mode.value.real))
     others = [mode for mode in shown if mode.motion != SYMMETRY]
     vanish = sorted(others, key=lambda mode: abs(mode.value))[: max(zeros - (len(shown) - len(others)), 0)]
