@@ -45,7 +45,7 @@ LEFT: dict[str, Any] = {
 RIGHT: dict[str, Any] = {
     "clamped": clamped(lambda c: TIP, lambda c: turned(0.5 * c.P)),
     "pinned": pinned(lambda c: (TIP[0], TIP[1] + 0.05 * c.P, TIP[2])),
-    "guided": rodfem.sliding_hinge((0.0, 1.0, 0.0), (0.6, 0.0, 0.8), lambda c: TIP, lambda c: turned(0.3 + 0 * c.P)),
+    "guided": rodfem.sliding_hinge((0.0, 1.0, 0.0), (0.6, 0.0, 0.8), lambda c: TIP, lambda c: turned(0.2 * c.P)),
     "sliding": rodfem.sliding(lambda c: (0.15, 0.1, None), force=lambda c: (0.0, 0.0, -c.P)),
 }
 
