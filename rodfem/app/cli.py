@@ -98,13 +98,8 @@ def sentences(parser: Parser) -> Iterator[None]:
 
 
 def start_petsc(options: Sequence[str]) -> None:
-    """Load PETSc with its options, some of which it reads then; those that it refuses end with a sentence."""
-    try:
-        petsc4py = import_module("petsc4py")
-        petsc4py.init(["rodfem", *options])
-    except Exception as trouble:  # petsc4py has no class of its own for errors until PETSc is loaded
-        words = str(trouble).splitlines()[0]
-        complain(f"PETSc does not start with the options {' '.join(options)} ({words}): see whether files are missing.")
+    """Load PETSc with its options, some of which it reads then."""
+    import_module("petsc4py").init(["rodfem", *options])
 
 
 def complain(sentence: str) -> NoReturn:

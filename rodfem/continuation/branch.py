@@ -137,7 +137,7 @@ class Point:
         if self.solver is None:
             return None
         place = np.array([sum(self.solver.system.scene.interval) / 2])
-        k = self.solver.resultants.strains(self.x, place)[0, 1]
+        k = self.solver.resultants.profile(self.x, place).curvature[0]
         return float(np.hypot(k[0], k[1]))
 
     @property

@@ -120,10 +120,6 @@ class Resultants:
         s = self.shape.sample(x)["s"] if s is None else np.asarray(s, dtype=float)
         return self.on_elements(x, s, self._elements(s))
 
-    def strains(self, x: PETSc.Vec, s: np.ndarray) -> np.ndarray:
-        """Strain and curvature at arclengths ``s`` (m,) of the state ``x``, as :meth:`profile` has them, (m, 2, 3)."""
-        return self._mean(self.nodes[1:-1], self._values(x)[:, 1:-1, :2], s, self._elements(s))
-
     def _elements(self, s: np.ndarray) -> np.ndarray:
         """Elements (2, m) to the left and to the right of arclengths."""
         starts = self.shape.from_left(self.shape.start)
