@@ -24,7 +24,7 @@ from rodfem import compat
 from rodfem.continuation.branch import Point
 from rodfem.continuation.branch_solver import BranchSolver, Step
 from rodfem.continuation.curves import ALIGNED, ROWS, lagrange, predict
-from rodfem.errors import ConvergenceError, InputError, many
+from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.newton import violation
 from rodfem.fem.system import System
 from rodfem.linalg.orthogonal import combine
@@ -231,11 +231,8 @@ class _Walk:
         """Halve the step, or end the branch, where the last point was ``most`` far from the next one at most."""
         self._step, self._failures = self._step / 2, self._failures + 1
         if self._step < min(self.steps.smallest, 0.01 * most):
-            system, why = self.solver.system, f"steps below {self.steps.smallest:g}"
-            if last.zero > (drifts := system.active_drifts(last.x)):
-                vanish = many(last.zero - drifts, "eigenvalue vanishes", "eigenvalues vanish")
-                why += f"; {vanish} there to working accuracy"
-            self.ended = f"no convergence at {system.scene.load} = {last.load:.6g} ({why}{self._missed})"
+            where = f"{self.solver.system.scene.load} = {last.load:.6g}"
+            self.ended = f"no convergence at {where} (steps below {self.steps.smallest:g}{self._missed})"
 
 
 def _moved(solver: BranchSolver, x: PETSc.Vec, by: float) -> PETSc.Vec:

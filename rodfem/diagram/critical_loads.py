@@ -342,8 +342,6 @@ class CriticalLoads:
             try:
                 return self._located(here, there, cluster, just_met=just_met)
             except ConvergenceError:
-                if 0 < D < (ALIKE * scale) ** 2:
-                    return self._at_once(here, there, other)
                 if D > 0:
                     raise
         elif -D > 4.0 * there.spectrum.noise[abs(there.spectrum.values - mean).argmin()] ** 2:
