@@ -59,7 +59,7 @@ class Role:
 
     ``words`` have ``{}`` for where it is: ``force on the {} end``; ``call`` is ``f(c)`` of the constants, ``f(x, c)``
     of a place, or another.  It returns ``size`` components, 0 for a scalar, None if that is checked elsewhere; one may
-    be None if there are ``gaps``.  Its place is the whole rod if it is ``along``; unless ``placed`` its constants lack
+    be None if there are ``gaps``.  Its place is the whole rod if it is ``along``; unless ``placed`` it must not ask for
     the arclength.  ``or_value`` lets a constant stay as it is, ``returns`` converts its value.
     """
 

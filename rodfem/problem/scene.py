@@ -348,9 +348,6 @@ class Scene(Contribution, metaclass=Stated):
         a, b = self.interval
         if not (isfinite(a) and isfinite(b) and a < b):
             raise SceneError(f"The rod's interval ({a:g}, {b:g}) is empty: give two finite ends, the left one first.")
-        if b - a < 1e-9 * max(abs(a), abs(b)):  # round-off of arclengths is seen then
-            what = f"A rod from {a:g} to {b:g} is short for its arclengths' round-off"
-            raise SceneError(f"{what}: let the arclength begin at zero.")
         if not isinstance(self.rod, str) or self.rod not in RODS:
             raise SceneError(f"Unknown kind of rod {self.rod!r}: choose one of {', '.join(map(repr, RODS))}.")
         if not isinstance(self.load, str) or self.load not in self.parameters:

@@ -2,7 +2,8 @@
 
 In the equations each constant is an expression that stands for any number of its range.  A function that branches by
 the value of a constant (``c.on == 1``, ``in``, ``if c.on``, a key of a dictionary) takes one branch for numbers and may
-take another there.  So the function and its expression are compared at the same constants and states.
+take another there.  So the function and its expression are compared at the same constants and states.  The symbols in
+the expression are what the function depends on: constants, components of the state, the arclength.
 
 Of a planar rod, functions of the constants are zero across the plane; functions of the state, and the stored energy,
 have one value at two states that are each other's image by the plane.

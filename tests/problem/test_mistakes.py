@@ -127,7 +127,6 @@ SCENES: list[tuple[dict[str, Any] | Callable[[], dict[str, Any]], str]] = [
     ({"title": 3}, "title is 3"),
     *(({"interval": x}, r"interval(\[\d\])? is") for x in (None, (1.0,), "01", {0.0, 1.0}, (0, 10**400))),
     ({"interval": (1.0, 0.0)}, "interval"),
-    ({"interval": (1e16, 1e16 + 2), "ordinate": Ordinate("tip", 1e16, lambda r, q: 0.0)}, "short for its arclengths"),
     *(({"span": x}, r"span(\[\d\])? is") for x in ((True, False), (0, 1j))),
     ({"span": (0.3, 0.3)}, "empty"),
     ({"span": (1.0, 1.0 + 3e-16)}, "range of P from .* round-off"),
