@@ -93,11 +93,6 @@ def takes(function: Any, arguments: int) -> bool:
     return True
 
 
-def encodes(name: str) -> bool:
-    """Whether a name can be that of a file: no zero byte, no half of a surrogate pair."""
-    return "\0" not in name and not any("\ud800" <= c <= "\udc7f" for c in name)
-
-
 def checked(**checks: Check) -> Callable[[Callable[P, T]], Callable[P, T]]:
     """Decorator of a function whose arguments are checked, and converted; a default is not."""
 
@@ -173,7 +168,7 @@ def path(example: str) -> Check:
     """Check for a path, or the name of one."""
 
     def check(name: str, value: Any) -> Path:
-        if not isinstance(value, (str, os.PathLike)) or not str(value) or not encodes(str(value)):
+        if not isinstance(value, (str, os.PathLike)) or not str(value) or "\0" in str(value):
             raise refused(name, value, f"a path, as in @={example!r}")
         return Path(value)
 

@@ -21,7 +21,7 @@ import ufl
 from rodfem.errors import SceneError
 from rodfem.expressions import differentiated, evaluated, parts
 from rodfem.forms.kinematics import RODS, UNDEFORMED, strain
-from rodfem.problem.arguments import Check, a, convert, encodes, finite, interval, optional, plain, real, text
+from rodfem.problem.arguments import Check, a, convert, finite, interval, optional, plain, real, text
 from rodfem.problem.contribution import DEAD, FOLLOWER, POTENTIAL, Attachment, Constraint, Contribution, acting
 from rodfem.problem.ends import End, Ring
 from rodfem.problem.functions import (
@@ -204,7 +204,7 @@ class Part(NamedTuple):
 def _folder(name: str, value: Any) -> str:
     """Check for the name of a scene or a branch."""
     word: str = text("column")(name, value)
-    if word in ("", ".", "..") or not encodes(word) or set(word) & set("/\\\n"):
+    if word in ("", ".", "..") or set(word) & set("/\\\n\0"):
         raise SceneError(f"The name {word!r} cannot be that of a folder: give a text without slashes.")
     if name == "states" and GIVEN.fullmatch(word):
         raise SceneError(f"states is {word!r}, a name which others are given: choose another, as 'straight'.")
