@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle, pairwise, product
-from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +20,7 @@ from rodfem.continuation.kinds import KINDS
 from rodfem.output import style
 from rodfem.output.pieces import COUNTED, Piece, endings, pieces_of
 from rodfem.output.style import END, FONT, HALO, LINES, PALETTE
-from rodfem.output.words import mesh_in_words, rounded_up
+from rodfem.output.words import greatest_error, mesh_in_words
 from rodfem.stability.soft_mode import STABLE
 from rodfem.tolerances import TINY
 
@@ -209,20 +208,13 @@ def _label_places(curve: Floats, half: Floats) -> Floats:
 def _subtitle(diagram: Mapping[str, Any]) -> str:
     """Return the line that names the discretisation and the accuracy of the special points."""
     d, special = diagram.get("discretization"), [s for b in diagram["branches"] for s in b.get("special", [])]
-    parts = [mesh_in_words(d)] if d else []
+    mesh = mesh_in_words(d) if d else ""
     if d and diagram.get("accuracy"):
-        parts = [f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"]
+        mesh = f"{d['formulation']} formulation, {len(diagram['meshes'])} meshes of up to {d['unknowns']} unknowns"
     coarse = sum(point.get("resolved") is False for point in special)
-    rest = [f"{coarse} of {len(special)} special points not resolved by the mesh"] * bool(coarse)
-    return "; ".join([*parts, *_accuracy([point for point in special if point["kind"] in COUNTED]), *rest])
-
-
-def _accuracy(special: Branches) -> list[str]:
-    """Greatest bound of the errors of special points in words; nothing where none is known."""
-    bars = [point.get("error_estimate") for point in special if point.get("resolved") is not False]
-    known = [abs(bar) for bar in bars if bar is not None and isfinite(bar)]
-    share = f" (of {len(known)} out of {len(special)})" if len(known) < len(special) else ""
-    return [f"error of the loads of special points at most {rounded_up(max(known)):.0e}{share}"] if known else []
+    rest = f"{coarse} of {len(special)} special points not resolved by the mesh" * bool(coarse)
+    error = greatest_error("the loads of special points", [s for s in special if s["kind"] in COUNTED])
+    return "; ".join(filter(None, [mesh, error, rest]))
 
 
 # --- branches between their rows

@@ -22,7 +22,7 @@ from rodfem.continuation.kinds import DIVERGENCE, FLUTTER, FREQUENCY, KINDS
 from rodfem.modes.modes import RIGID
 from rodfem.output.pieces import Interval, intervals_of
 from rodfem.output.style import PALETTE, STYLE, axis_label, explain, save, sheet
-from rodfem.output.words import mesh_in_words, rounded_up
+from rodfem.output.words import greatest_error, mesh_in_words
 from rodfem.stability.soft_mode import STABLE
 
 Member = tuple[float, int, complex, str]  # load, row, eigenvalue and motion of a point of a curve
@@ -50,21 +50,14 @@ def draw_frequencies(diagram: Mapping[str, Any], path: Path) -> Path:
 def figure_of(diagram: Mapping[str, Any], given: Axes | None = None) -> Figure:
     """Figure of the frequencies, as :func:`draw_frequencies` writes it, or that of axes that are ``given``."""
     branches = [b for b in diagram["branches"] if b["columns"].get("omega2")]
-    about = mesh_in_words(diagram["discretization"]) + _accuracy(branches)
+    error = greatest_error("critical loads", [s for b in branches for s in b["special"] if s["kind"] in SPECIAL])
+    about = "; ".join(filter(None, [mesh_in_words(diagram["discretization"]), error]))
     with matplotlib.rc_context(STYLE):
         figure, axes = sheet(str(diagram["title"]), about, given)
         handles = draw_into(axes, branches)
         axes.set_xlabel(axis_label(diagram))
         explain(axes, handles)
     return figure
-
-
-def _accuracy(branches: Sequence[Mapping[str, Any]]) -> str:
-    """Greatest bound of the errors of the special loads."""
-    found = [s for b in branches for s in b["special"] if s["kind"] in SPECIAL and s["error_estimate"] is not None]
-    kinds, bars = {s["kind"] for s in found}, [s["error_estimate"] for s in found]
-    words = " and ".join(kind for kind in SPECIAL if kind in kinds)
-    return f"; error of {words} loads at most {rounded_up(max(bars)):.0e}" if found else ""
 
 
 def draw_into(axes: Axes, branches: Sequence[Mapping[str, Any]]) -> list[Artist]:

@@ -44,6 +44,14 @@ def rounded_up(error: float) -> float:
     return float(f"{ceil(error / 10.0**power * (1 - NEGLIGIBLE))}e{power}")
 
 
+def greatest_error(what: str, special: Sequence[Data]) -> str:
+    """Greatest error of the loads of ``special`` points, ``what`` they are, and how many are known; or empty."""
+    bars = [point.get("error_estimate") for point in special if point.get("resolved") is not False]
+    known = [abs(bar) for bar in bars if bar is not None and isfinite(bar)]
+    share = f" (of {len(known)} out of {len(special)})" if len(known) < len(special) else ""
+    return f"error of {what} at most {rounded_up(max(known)):.0e}{share}" if known else ""
+
+
 def number(value: float, error: float, resolved: bool | None = True, scale: float = 0.0) -> str:
     """A ``value`` with the digits that its error supports, and its bar: ``0.3216501 (3e-07)``.
 
