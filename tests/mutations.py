@@ -262,6 +262,8 @@ TABLE = {
     "rodfem/diagram/special_search.py": {
         "folds-have-no-other-side": (
             "self._missed(piece, at, fold=found)", "pass", "continuation/test_unfolding.py"),
+        "steps-are-short-from-where-a-branch-goes-back-to": (
+            "max(largest, since - s)", "largest", "diagram/test_branches.py"),
     },
     "rodfem/diagram/sweep.py": {
         "bars-of-loads-by-those-of-ordinates": (
@@ -452,6 +454,10 @@ TABLE = {
     },
     "rodfem/stability/nonsymmetric.py": {
         "matrices-pile-up": ("if self.filled % 64 == 0:", "if False:", "diagram/test_sweep.py"),
+        "slow-frequencies-are-round-off": (
+            "slow = np.flatnonzero(abs(values) < SLOW * one)", "slow = np.flatnonzero(abs(values) < 0.0)", HARD),
+        "rods-that-soften-are-not-slow": (
+            "not (self.solver.slow or several)", "not self.solver.slow", "diagram/test_light_and_slow_rods.py"),
         "modes-without-their-parts-along-free-motions": (
             "            force.array[drifts] = 0.0\n", "", "literature/test_free_rods.py"),
     },

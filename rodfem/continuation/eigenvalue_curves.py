@@ -29,7 +29,7 @@ NODES = np.cos(np.pi * (np.arange(6)[::-1] + 0.5) / 6)
 OUTSIDE = 1.5
 """Distance from the middle, in half lengths of its interval, up to which a series is extrapolated to a zero."""
 
-AROUND = 1e-4  # half width, relative to a divergence load, over which its eigenvalues are sampled
+AROUND = (1e-4, 1e-5, 1e-6)  # half widths, relative to a divergence load, over which its eigenvalues are sampled
 
 AtLoad = Callable[[float, Cluster], Measured]
 Number = Callable[[float], float]
@@ -76,7 +76,7 @@ class Curves:
         """
         outside = 1.0 - np.minimum(np.add.reduceat(parts, self._begin, axis=0), 1.0)[self._span]
         a, b = last.values[:, None], found.values[None, :]
-        return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), found.one))
+        return np.asarray(outside + abs(a - b) / np.maximum(np.maximum(abs(a), abs(b)), min(found.one, found.natural)))
 
     def _keep(self, found: Frequencies, energy: np.ndarray) -> None:
         """Keep a basis of the span of each group of equal eigenvalues, orthonormal in the mass."""
@@ -152,20 +152,30 @@ def interpolated_zero(mean: Number, noise: Number, load: float, one: float) -> t
 
     Both are functions of the load, of natural size ``one``; raises :class:`ConvergenceError`.
     """
-    half = AROUND * unit(load, one=one)
-    series = interpolant([mean(load + half * t) for t in NODES.tolist()])
-    root = real_root(series)
-    if root is None:
+    found = list[tuple[float, float]]()
+    for half in (width * unit(load, one=one) for width in AROUND):
+        try:
+            series = interpolant([mean(load + half * t) for t in NODES.tolist()])
+            root = real_root(series)
+            if root is None:
+                continue
+            doubt = in_doubt(series) + noise(load + half * root)
+        except ConvergenceError:
+            continue
+        found.append((half * zero_uncertainty(series, root, doubt), load + half * root))
+        if found[-1][0] < ENOUGH * unit(load, one=one):
+            break
+    if not found:
         raise ConvergenceError(f"The divergence load near {load:.6g} could not be located: use a smaller range.")
-    at = load + half * root
-    return at, half * zero_uncertainty(series, root, in_doubt(series) + noise(at))
+    uncertainty, at = min(found)
+    return at, uncertainty
 
 
 def zero_near(mean: Number, noise: Number, load: float, one: float) -> tuple[float, float]:
     """The same on another mesh than that of a ``load``, by secants first."""
     from scipy.optimize import newton  # slow to load
 
-    step = 0.01 * AROUND * unit(load, one=one)
+    step = AROUND[-1] * unit(load, one=one)
     with catch_warnings():  # two equal values end the secants
         simplefilter("ignore", RuntimeWarning)
         near = newton(mean, load, x1=load + step, tol=step, full_output=True, disp=False)[0]

@@ -31,7 +31,7 @@ from rodfem.ranks import as_failure, guard
 from rodfem.stability.cluster import Cluster
 from rodfem.stability.dependence import may_depend, require_independent_constraints
 from rodfem.stability.inertia import Index
-from rodfem.stability.nonsymmetric import FREQUENCIES, REAL, Frequencies, NonsymmetricSolver, label
+from rodfem.stability.nonsymmetric import FREQUENCIES, REAL, Frequencies, NonsymmetricSolver, begins_slowly, label
 from rodfem.tolerances import DRIFT, ROUND_OFF, round_off
 
 LOADS = 101  # number of loads at which a range is sampled
@@ -110,8 +110,9 @@ class Sweep:
         self.observer.branch(branch)
         x = at_load(self.solver, x, loads[0])
         self.solver.require_convexity(x)
-        if not self.eigensolver.at(x).spectrum.complete:
+        if not (spectrum := self.eigensolver.at(x).spectrum).complete:
             self.observer.note("  the mesh has too many unknowns to find all frequencies: those nearest zero are found")
+        self.eigensolver.slow = begins_slowly(spectrum)
         for motion in self.solver.system.free_motions(x):
             self.observer.note(f"  nothing holds the rod against the {motion}: its frequency, zero, is left out")
         try:

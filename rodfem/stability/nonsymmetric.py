@@ -3,7 +3,9 @@
 A follower load makes the tangent matrix ``S`` non-symmetric, by a matrix of low rank (the linearised end load couples
 the rotation of the end to the forces there).  Two real eigenvalues may then collide and leave the real axis: flutter.
 
-What round-off makes of an eigenvalue that is zero is bounded by 1e-7 of the natural size of bending.
+What round-off makes of an eigenvalue that is zero is bounded by 1e-7 of the natural size of bending.  For a rod with
+motions far slower than bending, as a stiff rod on soft supports, it is measured: independent relative errors of all
+entries of the matrix, and what a state leaves open.
 
 A motion ``g`` that nothing holds has ``S g = 0``.  The pencil is bordered by ``M g`` on both sides: an eigenvector
 ``x`` of ``mu`` becomes ``x - g (g.Mx)`` with the multiplier ``-mu (g.Mx)``, and all of the spectrum is left but a zero.
@@ -21,9 +23,10 @@ from petsc4py import PETSc
 
 from rodfem import compat
 from rodfem.fem.system import System
-from rodfem.linalg.matrices import EPS, gathered, local_rows
+from rodfem.linalg.matrices import EPS, gathered, local_rows, rounding_of
 from rodfem.problem.trials import floats
 from rodfem.stability import motion_names
+from rodfem.stability.inertia import NOISE
 from rodfem.stability.pencil import PencilMatrices, assemble_pencil, exclude_modes, in_units, symmetry_modes
 from rodfem.stability.spectrum import REAL, SHIFT, Eigenpairs, Spectrum, inside, size_of_zero, times
 
@@ -37,6 +40,8 @@ BEYOND = 6
 """The same next to the shift, for those nearest zero: a negative one may be nearer to the shift."""
 FREQUENCIES = 6
 """Number of frequencies recorded at each load where nobody asks for another."""
+SLOW, SOLVED = 1e-3, 1e-9
+"""Part of the natural size below which eigenvalues are slow, and what a state leaves open of them."""
 
 ITERATIONS = 12
 LITTLE = 1e-6
@@ -54,6 +59,7 @@ class Frequencies:
     weighed: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))  # their products with the mass
     one: float = 1.0  # natural size of the eigenvalues
     floating: bool = False  # whether nothing holds the rod: some are zero
+    floor: float = np.inf  # what round-off makes of zero, of a rod that is held and has slow motions
 
     @property
     def far(self) -> float:
@@ -68,12 +74,12 @@ class Frequencies:
     def natural(self) -> float:
         """Natural size of the slowest motions: that of the two slowest eigenvalues, and of bending at least."""
         slowest = float(np.sort(abs(self.values))[:2].max(initial=0.0))
-        return max(slowest, self.one)
+        return max(slowest, self.one if np.isinf(self.floor) else self.floor)
 
     @property
     def noise(self) -> float:
         """Magnitude below which an eigenvalue counts as zero."""
-        return size_of_zero(self.values, self.one)
+        return size_of_zero(self.values, self.one, self.floor)
 
     def zeros(self) -> int:
         """Number of eigenvalues that are zero: of rigid motions, and their partners in Jordan blocks."""
@@ -81,7 +87,8 @@ class Frequencies:
 
     def in_order(self) -> Frequencies:
         """The same in ascending order of real parts, without names."""
-        order = np.lexsort((self.values.imag, np.round(self.values.real / self.one, 6)))
+        scale = min(self.one, self.natural)
+        order = np.lexsort((self.values.imag, np.round(self.values.real / scale, 6)))
         columns = {name: getattr(self, name)[:, order] for name in ("vectors", "weighed")}
         return replace(self, values=self.values[order], errors=self.errors[order], **columns)
 
@@ -142,13 +149,16 @@ def orthonormal(comm: MPI.Comm, vectors: np.ndarray, weighed: np.ndarray) -> np.
 
 
 class NonsymmetricSolver(PencilMatrices):
-    """Matrices of the pencil, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`."""
+    """Matrices of the pencil, which the states of one :class:`~rodfem.fem.system.System` share: see :meth:`at`.
+
+    The rod is ``slow`` if it has motions far slower than bending at its first state: their round-off is measured.
+    """
 
     def __init__(self, system: System) -> None:
         super().__init__(system)
         self.free = list[PETSc.Vec]()
         self.floating = system.scene.closed or floats(system.scene)
-        self.filled = 0
+        self.slow, self.filled = False, 0
 
     def at(self, x: PETSc.Vec) -> NonsymmetricPencil:
         """Assemble the pencil at the state ``x``, without the motions of symmetries, which may make it singular."""
@@ -201,7 +211,9 @@ class NonsymmetricPencil:
     def spectrum(self) -> Spectrum:
         """All eigenvalues that the mesh has; of a mesh with many unknowns those nearest zero."""
         with self.system.clock("stability"):
-            return self.inverse(SHIFT * self._one)
+            found = self.inverse(SHIFT * self._one)
+            found.floor = self._floor(found)
+            return found
 
     @property
     def massless(self) -> int:
@@ -211,6 +223,23 @@ class NonsymmetricPencil:
         found = Spectrum(*self._in_units(mass), SHIFT, self._one)
         found.order = self.spectrum.order
         return found.unstable - self.spectrum.unstable if found.complete else 0
+
+    def _floor(self, spectrum: Spectrum) -> float:
+        """Round-off of the slow eigenvalues in the ``spectrum``; infinite where the rod has none.
+
+        Two distinct ones are slow: one, or a multiple one, may be about to vanish in any rod.
+        """
+        values, one = spectrum.values, spectrum.one
+        slow = np.flatnonzero(abs(values) < SLOW * one)
+        apart = 1e-3 * abs(values[slow]).max(initial=0.0)  # two that are not one
+        several = (abs(values[slow] - values[slow[:1]]) > apart).any()
+        if self.solver.floating or not len(slow) or not (self.solver.slow or several):
+            return np.inf
+        found = self.frequencies(spectrum, slow)
+        energy = abs(squares(self.system.comm, found.vectors, found.weighed))
+        columns = zip(found.vectors.T, energy.tolist(), strict=True)
+        rounded = [rounding_of(self.matrix, v, v) / e for v, e in columns if e > 0]
+        return max(SOLVED * one, float(spectrum.noise[slow].max()), NOISE * max(rounded, default=0.0))
 
     def nearest(self, number: int, target: float, *, left: bool = False) -> Frequencies:
         """Return the eigenvalues nearest to ``target``, ``number`` or more, or all there are, in ascending order.
@@ -236,7 +265,8 @@ class NonsymmetricPencil:
 
     def frequencies(self, spectrum: Spectrum, places: np.ndarray) -> Frequencies:
         """Frequencies of some eigenvalues of a ``spectrum`` of this state, in its order and not named yet."""
-        return self._frequencies(spectrum, spectrum.values[places] / self._one, spectrum.pairs.at(places))
+        found = self._frequencies(spectrum, spectrum.values[places] / self._one, spectrum.pairs.at(places))
+        return replace(found, floor=spectrum.floor)
 
     def _frequencies(
         self, spectrum: Spectrum, values: np.ndarray, pairs: Eigenpairs, *, left: bool = False
@@ -298,6 +328,12 @@ class NonsymmetricPencil:
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """``a^* b`` of all ranks' rows."""
         return product(self.system.comm, a, b)
+
+
+def begins_slowly(spectrum: Spectrum) -> bool:
+    """Whether one of the eigenvalues of the first state is slow: it is about to vanish in no ordinary rod."""
+    sizes = abs(spectrum.values) / spectrum.one
+    return bool(((sizes > 10.0 * SOLVED) & (sizes < SLOW)).any())
 
 
 def _half(nu: np.ndarray) -> int:

@@ -95,7 +95,8 @@ class Eigenpairs(NamedTuple):
 class Spectrum:
     """A pencil on its unknowns with mass about a ``shift``, and all its finite eigenvalues, nearest to that first.
 
-    ``one`` is their natural size, the unit of the ``shift``.
+    ``one`` is their natural size, the unit of the ``shift``.  ``floor`` is what round-off makes of zero, where it is
+    known (:mod:`rodfem.stability.nonsymmetric`).
     """
 
     order = 2  # of the equations of motion in time: of the first order eigenvalues are rates of decay
@@ -109,7 +110,7 @@ class Spectrum:
                 f"The pencil is singular at the shift {shift:.6g}: choose another load, or another discretisation."
             ) from trouble
         self.solve, self.solve_transposed, self.shift, self.one = lu.solve, partial(lu.solve, trans="T"), shift, one
-        self.rows = mass.shape[0]
+        self.floor, self.rows, self._known = np.inf, mass.shape[0], dict[float, np.ndarray]()
         self.heavy, self.lower, self.dual = factors_of_mass(mass)
         self.rank = self.lower.shape[1]
 
@@ -215,19 +216,20 @@ class Spectrum:
         """What round-off may make of each eigenvalue (k,)."""
         return self.one * self.pairs.noise / abs(self.pairs.nu) ** 2
 
-    @cached_property
+    @property
     def values(self) -> np.ndarray:
-        """Eigenvalues (k,), complex; imaginary parts that are round-off are zero."""
-        values = self.one * (self.shift + 1.0 / self.pairs.nu)
-        least = np.maximum(REAL * np.maximum(abs(values), self.one), self.noise)
-        values = np.where(abs(values.imag) <= least, values.real, values).astype(complex)
-        values.setflags(write=False)
-        return values
+        """Eigenvalues (k,), complex; imaginary parts that are round-off, by the floor, are zero."""
+        if self.floor not in self._known:
+            values = self.one * (self.shift + 1.0 / self.pairs.nu)
+            least = np.maximum(REAL * np.maximum(abs(values), min(self.one, self.floor)), self.noise)
+            self._known[self.floor] = np.where(abs(values.imag) <= least, values.real, values).astype(complex)
+            self._known[self.floor].setflags(write=False)
+        return self._known[self.floor]
 
     @property
     def zero(self) -> float:
         """Magnitude below which an eigenvalue counts as zero."""
-        return size_of_zero(self.values, self.one)
+        return size_of_zero(self.values, self.one, self.floor)
 
     @property
     def negative(self) -> np.ndarray:
@@ -257,9 +259,10 @@ class Spectrum:
         return len(self.negative) + 2 * len(self.growing)
 
 
-def size_of_zero(values: np.ndarray, one: float) -> float:
-    """Magnitude below which one of some ``values``, of natural size ``one``, is zero."""
-    return REAL * max(one, float(abs(values).min(initial=np.inf)))
+def size_of_zero(values: np.ndarray, one: float, floor: float) -> float:
+    """Magnitude below which one of some ``values``, of natural size ``one``, is zero; round-off is the ``floor``."""
+    least = REAL * float(abs(values).min(initial=np.inf))
+    return min(max(REAL * one, least), max(floor, least))
 
 
 def inside(basis: np.ndarray, vectors: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Indices of all frequencies of light and slow rods, and infinite ones among the finite ones of light rods.
+"""Frequencies far below those of bending, and infinite ones among the finite ones of light rods.
 
 Of a rod without mass the tip moves as the mass on a spring, with ``mu = P^(3/2) / (sin a - a cos a)``, ``a = P^(1/2)``,
 for a mass of one: it is positive up to ``tan a = a``, P = 20.190728556, and passes there through infinity.  No load is
@@ -13,12 +13,14 @@ import classics
 import numpy as np
 import pytest
 from classics import column
+from hard.sweeps import THIN
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from rodfem import Attachment, Diagram, Discretization, End, Inertia, Ordinate, Plan, Scene, clamped, free, trace
 from rodfem.codim2.follow import NEAREST
 from rodfem.continuation.kinds import END
+from rodfem.forms import loads
 from rodfem.forms.energy import bending_and_twist
 
 POLE = 20.190728556
@@ -109,6 +111,28 @@ BECK = 20.0509536189738
 
 def swept(scene: Scene, **plan: Any) -> Diagram:
     return trace(scene, MESH, Plan(depth=0, **plan))
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("few_loads")
+def test_springs_that_soften_with_the_parameter() -> None:
+    """The first state is not slow: springs ``k = 10^-p``, a thrust of ``0.05 p k`` with ``P = k/3`` at ``p = 20/3``."""
+    k = lambda c: 10.0**-c.p  # noqa: E731
+    foot = End(
+        position=lambda c: (None, None, 0.0),
+        energy=lambda x, c: loads.spring(x.r, (k(c), 3 * k(c), 0.0)) + loads.rotational_spring(x.q, (0.0, 0.0, 1.0)),
+    )
+    tip = End(
+        follower=lambda c: (0.0, 0.0, -0.05 * c.p * k(c)),
+        energy=lambda x, c: loads.spring(x.r, (0.5 * k(c), 1.5 * k(c), 0.0)),
+    )
+    constants = {"p": 2.0, "B2": 1.3}
+    rod = column("softens", (foot, tip), (2.0, 8.0), load="p", inertia=THIN, constants=constants)
+    diagram = swept(rod, error_bars=False)
+    (flutter,) = diagram.special("flutter")
+    assert flutter.point.load == pytest.approx(20 / 3, abs=1e-4) and not diagram.warnings
+    found = diagram.locus(flutter, "B2", (1.2, 1.4))
+    assert found.index.tolist() == [[0, 2]] * len(found.values)
 
 
 @pytest.mark.long

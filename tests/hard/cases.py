@@ -112,7 +112,7 @@ SWEEPS = (
         (4e-13,),
         (0.0, 1e-14, -1e-14, 1e-13, -1e-13, 4e-13, -4e-13, 1e-11, -1e-11, 1e-9),
     ),
-    Case("flutter of a stiff rod on soft springs", sweeps.soft_springs, (1e-6,), (1e-5, 1e-6)),
+    Case("flutter of a stiff rod on soft springs", sweeps.soft_springs, (1e-7,), (1e-5, 1e-6, 3e-7, 1e-7, 3e-8, 1e-8)),
     *(
         Case(f"{kind} that comes and goes{where}", partial(sweeps.pair, kind, at), few, ABOVE)
         for kind in ("flutter", "divergence")
