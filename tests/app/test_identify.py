@@ -28,6 +28,28 @@ def deflection(k: np.ndarray) -> np.ndarray:
     return -(1 - np.cos(k)) / k
 
 
+def test_stiffness_and_natural_curvature_from_a_curve() -> None:
+    """k = M / B + K: exact data give B and K, and noise of 1e-3 errors of Gauss's theory, from the closed form."""
+    M, B, K = np.linspace(0.2, 2.6, 7), 2.0, 0.4
+    exact = deflection(M / B + K)
+    found = rodfem.identify(arc(), {"ordinate": np.column_stack([M, exact])}, ("B", "K"))
+    assert [found.values["B"], found.values["K"]] == pytest.approx([B, K], abs=1e-8)
+    assert [point.index for point in found.points] == [0] * len(M)
+
+    noisy = exact + 1e-3 * np.random.default_rng(3).standard_normal(len(M))
+    again = rodfem.identify(arc(), {"ordinate": np.column_stack([M, noisy])}, ("B", "K"), {"ordinate": 1e-3})
+    h = 1e-5
+    slopes = np.column_stack(
+        [
+            (deflection(M / (B + h) + K) - deflection(M / (B - h) + K)) / (2 * h),
+            (deflection(M / B + K + h) - deflection(M / B + K - h)) / (2 * h),
+        ]
+    )
+    sigma = 1e-3 * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+    assert [again.errors["B"], again.errors["K"]] == pytest.approx(sigma, rel=0.05)
+    assert abs(again.values["B"] - B) < 3 * sigma[0] and abs(again.values["K"] - K) < 3 * sigma[1]
+
+
 def test_standard_errors_are_those_of_repeated_measurements(tmp_path: Path) -> None:
     """Of 16 curves in files, with noise of a size that is not told, estimates scatter by as much as they say."""
     M, B, K = np.linspace(0.2, 2.6, 7), 2.0, 0.4

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import closed_form_hemitropic
@@ -156,3 +157,12 @@ def test_errors_of_a_family_are_bounds(folder: Path) -> None:
     for rod in (found.isel(A=i, C=0) for i in range(4)):
         exact = closed_form_hemitropic.loads(float(rod.A), 1.0, 1.0, 3.0)
         assert (abs(rod.critical_load.values[:2] - exact) <= rod.error.values[:2] + 1e-14).all()
+
+
+@pytest.mark.long
+def test_a_thousand_rods_in_a_minute(folder: Path) -> None:
+    """On one core, with the closed form of each."""
+    over, begun = {"A": np.linspace(-3.0, 0.0, 40), "C": np.linspace(0.8, 1.2, 25)}, process_time()
+    found = family(hemitropic_cases.scene(), over, folder, Plan(depth=0, error_bars=False), comm=MPI.COMM_SELF)
+    assert process_time() - begun < 60.0
+    assert_closed_form(found.isel(A=slice(None, None, 3), C=slice(None, None, 4)))
