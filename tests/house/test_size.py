@@ -12,10 +12,10 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 31291,
+    "lines of Python": 31341,
     "files of Python": 147,
     "lines of C": 1026,
-    "module constants with a number": 243,
+    "module constants with a number": 244,
     "functions of a complexity above 10": 0,
     "functions of six parameters or more": 18,
     "places that warn": 21,
