@@ -262,8 +262,6 @@ TABLE = {
     "rodfem/diagram/special_search.py": {
         "folds-have-no-other-side": (
             "self._missed(piece, at, fold=found)", "pass", "continuation/test_unfolding.py"),
-        "steps-are-short-from-where-a-branch-goes-back-to": (
-            "max(largest, since - s)", "largest", "diagram/test_branches.py"),
     },
     "rodfem/diagram/sweep.py": {
         "bars-of-loads-by-those-of-ordinates": (

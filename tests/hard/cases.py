@@ -135,7 +135,10 @@ SWEEPS = (
 LOCI = (
     *(
         Case(f"a gap between two loci of {kind}s", partial(loci.gap, kind), few, widths)
-        for kind, few, widths in (("branch point", (2e-2, 0.0), (0.1, 2e-2, 0.0)), ("fold", (2e-2,), (0.05, 2e-2)))
+        for kind, few, widths in (
+            ("branch point", (1e-3, 0.0), (0.1, 2e-2, 1e-3, 1e-5, 0.0)),
+            ("fold", (5e-3,), (0.05, 5e-3, 1e-4)),
+        )
     ),
     *(
         Case(f"a {kind} of both planes that becomes two", partial(loci.split, kind), few, (2, 3, 4, 6))
