@@ -311,6 +311,9 @@ TABLE = {
             "(out.formulation, out.unknown_scalars) == (self.formulation, self.unknown_scalars)", "True",
             OTHER_CONSTANTS),
         "mumps-in-any-units": ("Mumps(kind, sizes)", "Mumps(kind)", "problem/test_units.py"),
+        "more-modes-than-there-are": (
+            "if number > (most := most_eigenvalues(scene, discretization)):",
+            "if number > 10**9 * (most := most_eigenvalues(scene, discretization)):", "stability/test_assessment.py"),
     },
     "rodfem/fem/fingerprint.py": {
         "rods-of-another-inertia-are-one": (

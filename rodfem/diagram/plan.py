@@ -7,7 +7,7 @@ from typing import Any
 
 from rodfem.continuation.follow import StepControl
 from rodfem.errors import InputError
-from rodfem.fem.fields import Discretization, check_mesh
+from rodfem.fem.fields import Discretization, check_mesh, most_eigenvalues
 from rodfem.problem.arguments import a, convert, each, interval, optional, real, reals, whole, yes_or_no
 from rodfem.problem.events import Event, Level
 from rodfem.problem.scene import Scene
@@ -183,6 +183,13 @@ class Plan:
         if self.accuracy is not None and discretization.vertices is None:
             return  # meshes are chosen on the way
         check_mesh(scene, discretization)
+        most = most_eigenvalues(scene, discretization)
+        for name in ("spectrum", "modes"):
+            if (asked := getattr(self, name)) > most:
+                raise InputError(
+                    f"The mesh has no more than {most} eigenvalues, not {asked}: give less in Plan({name}=...), or use "
+                    "more elements."
+                )
 
 
 def plan_of(plan: Plan | None, asked: dict[str, Any]) -> Plan:

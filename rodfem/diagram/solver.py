@@ -22,7 +22,7 @@ from rodfem.diagram.plan import Plan
 from rodfem.diagram.sweep import Sweep
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.checks import QuadratureCheck
-from rodfem.fem.fields import Discretization
+from rodfem.fem.fields import Discretization, check_number
 from rodfem.fem.system import System
 from rodfem.modes.finder import ModeFinder
 from rodfem.modes.modes import Modes
@@ -183,6 +183,7 @@ class Solver:
         than the mesh has, and :class:`~rodfem.errors.ConvergenceError` where an eigensolver fails.
         """
         x = self._state(point)
+        check_number(self.scene, self.equilibria.system.fields.discretization, number)
         verdict = Assessor(self.equilibria)(x, method, number)
         if not self.equilibria.conservative:
             return replace(verdict, kink=self._quadrature.kink(x))
@@ -197,6 +198,7 @@ class Solver:
         There are ``number`` of them.  Raises :class:`~rodfem.errors.InputError` for fewer than one, and for more than
         the mesh has.
         """
+        check_number(self.scene, self.equilibria.system.fields.discretization, number)
         return self._finder(self._state(point), number, method)[1]
 
     @checked(states=path("results/column/states.h5"), branch=text("branch 1"), row=whole(0, 0))

@@ -130,6 +130,22 @@ def check_mesh(scene: Scene, discretization: Discretization, ranks: int = 1) -> 
         )
 
 
+def most_eigenvalues(scene: Scene, discretization: Discretization) -> int:
+    """Bound of the number of finite eigenvalues of the discrete rod: what can turn, and what moves with a mass."""
+    turning, moving = (3, 3) if scene.normal is None else (1, 2)
+    at_a_node = turning + (moving if scene.has_inertia or not scene.conservative else 0)
+    return at_a_node * (discretization.elements * discretization.degree + 1)
+
+
+def check_number(scene: Scene, discretization: Discretization, number: int) -> None:
+    """Raise :class:`InputError` where a ``scene`` has fewer than so many eigenvalues on a ``discretization``."""
+    if number > (most := most_eigenvalues(scene, discretization)):
+        raise InputError(
+            f"The mesh has no more than {most} eigenvalues, not {number}: give number={most} or less, or use more "
+            "elements."
+        )
+
+
 class Fields:
     """Mesh, mixed space, the unknown ``u`` of all forms as a dolfinx Function, and the numbering of free unknowns.
 

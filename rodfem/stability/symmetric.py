@@ -109,7 +109,6 @@ class SymmetricSolver(PencilMatrices):
 
     def leftmost(self, number: int) -> Eigenvalues:
         """Return the ``number`` left-most eigenvalues in its units; :class:`ConvergenceError` if there are fewer."""
-        asked, number = number, min(number, self.system.fields.unknowns)
         with self.system.clock("stability"):
             modes = self._solve(number, 1) if len(self.last) else None
             if modes is None or not modes.certified:
@@ -119,9 +118,9 @@ class SymmetricSolver(PencilMatrices):
                     if modes.certified:
                         break
         assert modes is not None
-        if len(modes.values) < asked:
+        if len(modes.values) < number:
             raise ConvergenceError(
-                f"SLEPc found {len(modes.values)} of the {asked} eigenvalues asked for: ask for fewer, or use a "
+                f"SLEPc found {len(modes.values)} of the {number} eigenvalues asked for: ask for fewer, or use a "
                 "richer discretisation."
             )
         spread = modes.values[-1] - modes.values[0] + 1e-3 * abs(modes.values).max()  # equal ones have none

@@ -28,6 +28,8 @@ LINES = {
     "--at 1e308": "outside the range",
     "--step 0": "out of bounds",
     "--depth -1": "is not a depth",
+    "--spectrum 10000000000": "no more than 147 eigenvalues, not 10000000000: give less in --spectrum",
+    "--modes 10000000000 --at 0.1": "give less in --modes",
     "--modes 2": "give them in --at",
     "--modes 2 --method count --at 0.1": "Counting alone",
     "--method foo": "Unknown method",

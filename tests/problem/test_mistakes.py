@@ -262,6 +262,7 @@ def control(**named: Any) -> Plan:
 PLANS: list[tuple[Callable[[], Any], str]] = [
     (lambda: Plan((1.0, 1.0 + 3e-16)), "as narrow as round-off"),
     (lambda: Plan(error_bars="no"), "error_bars is 'no'"),  # type: ignore[arg-type]
+    (lambda: Plan(spectrum=10**10), "no more than 147 eigenvalues"),
     *((lambda x=x: Plan(events=x), r"events(\[0\])? is") for x in (None, Event("a", lambda s: 1.0), {1})),
     (lambda: event(lambda s: 1.0, 3), "name is 3"),
     (lambda: event(lambda s: 1.0, ""), "event has no name"),
@@ -310,6 +311,7 @@ def test_arguments_of_functions(tmp_path: Path) -> None:
         (lambda: rodfem.load_json(None), "path is None"),  # type: ignore[arg-type]
         (lambda: rodfem.load_json(True), "path is True"),  # type: ignore[arg-type]
         (lambda: rodfem.load_modes("a", "b", 0.5), "row is 0.5"),  # type: ignore[arg-type]
+        (lambda: rodfem.Solver(ours, spectrum=10**10), "no more than 147"),
     ]
     for call, words in cases:
         with pytest.raises(InputError, match=words):
