@@ -149,8 +149,8 @@ TABLE = {
     },
     "rodfem/continuation/normal_form.py": {
         "pitchforks-by-their-loads": (
-            "_pitchfork(leading(amplitudes, even, 2, origin.load_left), hidden",
-            "_pitchfork(Leading(even[-1], even[-1], 0.0), hidden", "continuation/test_degenerate_pitchforks.py"),
+            "load = leading(amplitudes, even, 2, origin.load_left)",
+            "load = Leading(even[-1], even[-1], 0.0)", "continuation/test_degenerate_pitchforks.py"),
         "pitchfork-opens-the-other-way": (
             "return NormalForm(PITCHFORK, best /", 'return NormalForm("pitchfork", -best /', ERRORS),
         "a-slope-hides-in-no-pitchfork": (" + hidden / abs(term.best) ** power", "", MIXED),

@@ -67,7 +67,7 @@ class Adjoint:
     def __init__(self, solver: BranchSolver, x: PETSc.Vec, near: SingularSystem | Cluster) -> None:
         """Take the vectors at ``x``, a solution of the equations of a singular point, or of a cluster ``near`` by."""
         self.solver, self.system, self.x, self.left = solver, solver.system, x, 0.0
-        self.values, self.load = _values(self.system), self.system.scalar(x)
+        self.values, self.load = values_of(self.system), self.system.scalar(x)
         self.null, self._duals, self.terms = list[PETSc.Vec](), list[tuple[PETSc.Vec, float]](), list[Terms]()
         rates = self._colliding(near) if isinstance(near, Cluster) else self._singular(near)
         self.rates = np.reshape(rates, (max(len(self.null), 1), -1))
@@ -218,7 +218,7 @@ def state_derivative(
 ) -> np.ndarray:
     """Derivative of numbers ``of`` an equilibrium in a parameter, at its load: along the change of state, a tangent."""
     system, load = solver.system, solver.system.scalar(x)
-    with along(system, x, _values(system), parameter) as there:
+    with along(system, x, values_of(system), parameter) as there:
         tangent = solver.load_tangent(there, increasing=True)
         slope = system.scalar(tangent)
         if not slope > TINY:
@@ -241,10 +241,11 @@ def ordinate_density(solver: BranchSolver, x: PETSc.Vec, parameter: str, pieces:
     system.set_load(gradient, 0.0)
     with restoration(system):
         (a,), _ = transposed(solver, x).solve([-gradient])
-    with along(system, x, _values(system), parameter) as there:
+    with along(system, x, values_of(system), parameter) as there:
         parts = _parts(system.at(there), (a, None, None, None), pieces)
     return _means(solver.shape, parts, pieces)
 
 
-def _values(system: System) -> dict[str, float]:
+def values_of(system: System) -> dict[str, float]:
+    """Values of all parameters at which a system is."""
     return dict(zip(system.scene.parameters, system.line.origin.tolist(), strict=True))

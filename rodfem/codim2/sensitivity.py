@@ -1,6 +1,18 @@
-r"""Derivatives of critical loads in the constants of a scene, and along the rod; of a state's ordinate.
+r"""Derivatives of critical loads in the constants of a scene, and along the rod; of coefficients, and of ordinates.
 
-See :mod:`rodfem.codim2.adjoint`.  An error is bounded by the same of a richer mesh.
+Those of loads: :mod:`rodfem.codim2.adjoint`.  An error is bounded by the same of a richer mesh.
+
+*The coefficient of a normal form*: near a branch point the branch is a curve in the amplitude ``a`` along the null
+vector, with load ``lam(a, p)`` and ordinate ``o(a, p)`` (:mod:`rodfem.continuation.normal_form`).  At each of its
+states UFL's derivative of the equations in the parameter ``p`` gives, by the factors of Newton's method, how state and
+load change at this amplitude, and the same factors give the tangent in ``a``.  The branch point moves along the curve,
+by ``da`` with ``dp``: to where the load is that of the branch point if it is transcritical, to where ``lam`` is
+stationary at a pitchfork,
+
+    lam_a da = lam_b' - lam_p,    or    lam_aa da = -lam_ap.
+
+Load and ordinate at a fixed distance from it change by ``lam_p + lam_a da`` and ``o_p + o_a da``, whose leading
+coefficients are the derivatives of ``l`` and ``x`` in the coefficient ``l / x^power``.
 """
 
 from __future__ import annotations
@@ -13,22 +25,29 @@ import numpy as np
 from petsc4py import PETSc
 
 from rodfem.adaptivity.error_estimate import Enriched, bound
-from rodfem.codim2.adjoint import DIFFERENCES, Adjoint, Found, ordinate_density, restoration, state_derivative
+from rodfem.codim2.adjoint import (
+    DIFFERENCES,
+    Adjoint,
+    Found,
+    along,
+    ordinate_density,
+    restoration,
+    state_derivative,
+    values_of,
+)
 from rodfem.codim2.follow import check_special, modes_of
-from rodfem.codim2.neighbours import Neighbours
-from rodfem.continuation.branch import Point, SpecialPoint
+from rodfem.continuation.branch import DISTANCE, ORDINATE, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import SHARP
 from rodfem.continuation.kinds import FLUTTER, FOLD
-from rodfem.continuation.normal_form import Origin, normal_form_of
+from rodfem.continuation.normal_form import LINEAR, SIZE, Expansion, Origin, expansion_of, parts
 from rodfem.continuation.singular import SingularSystem
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.shape import halved
-from rodfem.fem.state import line
 from rodfem.output.words import number
 from rodfem.problem.functions import derived
 from rodfem.stability.cluster import Cluster
-from rodfem.tolerances import TINY, round_off, unit
+from rodfem.tolerances import TINY, unit
 
 OnMesh = Callable[[PETSc.Vec], PETSc.Vec]
 PIECES = 4
@@ -192,28 +211,99 @@ def _richer(special: SpecialPoint) -> Adjoint:
 
 
 def coefficient_derivative(special: SpecialPoint, parameter: str) -> Derivative:
-    """Derivative of the coefficient of a normal form: differences of the fourth order, of forms at points found again.
+    """Derivative of the coefficient of a normal form in a ``parameter``; collective.
 
-    Raises :class:`InputError` for a point without one, :class:`ConvergenceError` for one that becomes of another kind.
+    Raises :class:`InputError` for a point without one, :class:`ConvergenceError` for one that the parameter destroys.
     """
     solver, law = special.point.own_solver, special.law
-    scene, near, value = solver.system.scene, Neighbours([special]), 0.0
-    scene.check_constant(parameter)
-    if law is None:
+    if law is None or not law.coefficient:
         raise InputError("This special point has no normal form: give a branch point from which a branch was followed.")
-    known, error = scene.parameters[parameter].value, 0.0
-    size = 10.0 * (abs(known) or 1.0)  # differences of a hundredth
-    for place, weight in DIFFERENCES:
-        (found,) = near.at({parameter: known + place * size})
-        with restoration(solver.system):
-            solver.system.line = line(scene, {**found.values, scene.load: 0.0}, {scene.load: 1.0})
-            ordinate, way = solver.shape.ordinate(found.x), found.null[0]
-            left = special.located_to, round_off(ordinate, solver.units.ordinate)
-            form = normal_form_of(solver, Origin(found.x, found.load, ordinate, *left), way / solver.system.norm(way))
-        if form is None or (form.power, form.of) != (law.power, law.of):
-            raise ConvergenceError(f"The normal form becomes another one near {parameter} = {known:g}.")
-        value, error = value + weight / size * form.coefficient, error + abs(weight) / size * form.uncertainty
-    return Derivative(value, lambda: (error, float("nan")))
+    rate = derivative(special, parameter).value
+
+    def of(own: BranchSolver, x: PETSc.Vec, null: PETSc.Vec) -> tuple[float, float]:
+        null = null / own.system.norm(null)
+        origin = Origin(x, own.system.scalar(x), own.shape.ordinate(x), special.located_to, 0.0)
+        with restoration(own.system):
+            found = expansion_of(own, origin, null)
+            if found is None or (found.form.power, found.form.of) != (law.power, law.of):
+                raise ConvergenceError(
+                    "The branch that leaves here has another normal form on this mesh: use more elements."
+                )
+            return _coefficient_rate(own, found, null, parameter, rate)
+
+    value, missed = of(solver, special.point.x, special.null_vectors[0])
+
+    def bounds() -> tuple[float, float]:
+        finer = derived(special, "richer", lambda: _richer(special))
+        null = richer_mesh(solver).transfer(special.null_vectors[0], state=False)
+        other, _ = of(finer.solver, finer.x, null)
+        return bound(value, other, missed, halved(solver.system.fields.discretization.degree)), float("nan")
+
+    return Derivative(value, bounds)
+
+
+def _coefficient_rate(
+    solver: BranchSolver, found: Expansion, null: PETSc.Vec, parameter: str, rate: float
+) -> tuple[float, float]:
+    """Derivative of the coefficient, and what the series leaves of it.
+
+    The branch was ``found`` along a ``null`` vector; ``rate`` is the derivative of the branch point's load.
+
+    Raises :class:`ConvergenceError` at a singular state of the branch.
+    """
+    row, reach, m = solver.row(null), found.amplitudes[-1], len(found.amplitudes)
+    moves = np.array([_moves(solver, x, row, parameter, reach) for x in found.states])
+    moves = moves.reshape(2, m, 2, 2).transpose(2, 3, 0, 1)
+    moves[:, 1] /= solver.units.ordinate
+    best, rough = (_rate(found, moves[..., first:], first, rate) for first in (0, 1))
+    one = solver.units.ordinate**found.form.power if found.form.of == ORDINATE else 1.0
+    return best / one, abs(best - rough) / one
+
+
+def _moves(solver: BranchSolver, x: PETSc.Vec, row: PETSc.Vec, parameter: str, reach: float) -> np.ndarray:
+    """Derivatives (2, 2) of load and ordinate of a state in the amplitude, and in a parameter, one row each."""
+    system = solver.system
+    with along(system, x, values_of(system), parameter) as there:
+        force = -solver.inertia.force(there)
+    system.set_load(force, 0.0)
+    system.set_phase(x)
+    system.at(x).factor(row)
+    return np.array([_move(solver, x, right, reach) for right in (solver.axis, force)])
+
+
+def _move(solver: BranchSolver, x: PETSc.Vec, right: PETSc.Vec, reach: float) -> tuple[float, float]:
+    """Derivatives of load and ordinate along the solution for a ``right`` side, the ordinate's by differences."""
+    system, change = solver.system, solver.system.new_vector()
+    if not system.solve(right, change):
+        raise ConvergenceError(f"The branch is singular at {system.scene.load} = {system.scalar(x):.8g}.")
+    size = max(system.norm(change), 1.0) / reach
+    ordinate = sum(w * size * solver.shape.ordinate(x + change * (place / size)) for place, w in DIFFERENCES)
+    return system.scalar(change), float(ordinate)
+
+
+def _fitted(a: np.ndarray, values: np.ndarray, powers: np.ndarray) -> np.ndarray:
+    """Coefficients of the ``powers`` of ``a`` in the polynomial through ``values``, (m,) all."""
+    return np.linalg.solve(a[:, None] ** powers, values)
+
+
+def _rate(found: Expansion, moves: np.ndarray, first: int, rate: float) -> float:
+    """The derivative by the amplitudes from the ``first`` on, at which ``moves`` (2, 2, 2, m) are known."""
+    a, (tangents, changes), power = found.amplitudes[first:], moves, found.form.power
+    even, odd = (2.0 * np.arange(len(a)) + least for least in (0, 1))
+    load = (found.load.best, found.load.rough)[first]
+    sides = parts(changes[0])
+    off = (rate - _fitted(a, sides[0], even)[0]) if found.order == 1 else -_fitted(a, sides[1], odd)[0] / 2
+    of_load, of_ordinate = (parts(each) for each in changes + tangents * (off / load))
+    slope = _fitted(a, of_load[1], odd)[0] if found.order == 1 else _fitted(a, of_load[0], even)[1]
+    if found.x is None or found.form.of == DISTANCE:
+        return float(slope)
+    term, leading, _ = found.x
+    x = (leading.best, leading.rough)[first]
+    if term == LINEAR:
+        change = _fitted(a, of_ordinate[1], odd)[0]
+    else:
+        change = _fitted(a, of_ordinate[0], np.append(0.0, odd[:-1]) if term == SIZE else even)[1]
+    return float((slope - power * load / x * change) / x**power)
 
 
 # --- of a state

@@ -14,7 +14,7 @@ import numpy as np
 from rodfem.continuation.kinds import BRANCH_POINT, NUMBER, Kind
 from rodfem.errors import SMALLER_STEPS, ConvergenceError, InputError, many
 from rodfem.libraries import optional
-from rodfem.problem.arguments import SHORT
+from rodfem.problem.arguments import SHORT, reals
 from rodfem.stability.soft_mode import STABLE, SoftMode, in_short, is_stable, stability
 
 if TYPE_CHECKING:
@@ -85,12 +85,12 @@ class Point:
     def profile(self, s: Sequence[float] | np.ndarray | None = None) -> Profile:
         """Shape, strains, contact force and moment at arclengths ``s`` (m,), by default at the nodes; collective.
 
-        Raises :class:`~rodfem.errors.InputError` for a place that is not on the rod.
+        Raises :class:`~rodfem.errors.InputError` for what is no arclength of the rod.
         """
         scene, resultants = self.own_solver.system.scene, self.own_solver.resultants
         if s is None:
             return resultants.profile(self.x)
-        places, (first, last) = np.atleast_1d(np.asarray(s, dtype=float)), scene.interval
+        places, (first, last) = np.array(reals("s", np.atleast_1d(s).tolist(), (0.0, 0.5))), scene.interval
         if not ((places >= first) & (places <= last)).all():
             raise InputError(f"The arclengths {SHORT.repr(s)} leave the rod: give some from {first:g} to {last:g}.")
         return resultants.profile(self.x, places)

@@ -134,6 +134,27 @@ Term = tuple[str, Leading, float] | None
 
 
 @dataclass(frozen=True)
+class Expansion:
+    """A branch near its branch point, by states at ``amplitudes`` (m,), and its normal form.
+
+    The ``load`` has its leading coefficient, of the amplitude to its ``order``, the ordinate ``x`` its leading term.
+    """
+
+    form: NormalForm
+    amplitudes: np.ndarray
+    states: list[PETSc.Vec]  # at the amplitudes, then at their opposites
+    load: Leading
+    order: int
+    x: Term
+    odd: float  # part of the load that is odd
+    change: float  # of the load, at the least amplitude
+
+    def resolved(self, least: bool) -> bool:
+        """Whether no smaller scale is tried: this has the ``least`` change, or the series is resolved, odd or even."""
+        return least or (min(self.odd, 1 - self.odd) < RESOLVED and self.form.resolved(RESOLVED))
+
+
+@dataclass(frozen=True)
 class Origin:
     """A branch point, with the uncertainties of its load and ordinate."""
 
@@ -164,27 +185,26 @@ def normal_form_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -
     """Normal form of the branch that leaves ``origin`` along ``direction``; None if nearby points do not determine it.
 
     Uncertain is what polynomials through three of four amplitudes miss, what a slope of the load adds at a pitchfork,
-    and what the location of the branch point leaves open of loads and ordinates that are measured from it.  Of several
-    scales the first at which the series is resolved is taken, else the best.
+    and what the location of the branch point leaves open of loads and ordinates that are measured from it.
     """
+    found = expansion_of(solver, origin, direction)
+    return None if found is None else found.form
+
+
+def expansion_of(solver: BranchSolver, origin: Origin, direction: PETSc.Vec) -> Expansion | None:
+    """The branch near ``origin``, at the first of several scales at which the series is resolved, else the best."""
     row, best, seen = solver.row(direction), None, SEEN * origin.load_left
     for scale in (1.0, 1 / 4, 1 / 16, 1 / 64):
         found = _at_scale(solver, origin, direction, row, scale)
         if found is None:
             continue
-        form, odd, change = found
-        other = best is not None and not alike(form, best)
-        if other and (form.of == DISTANCE or odd * change <= seen):
+        other = best is not None and not alike(found.form, best.form)
+        if other and (found.form.of == DISTANCE or found.odd * found.change <= seen):
             break  # what the ordinate changes by, or what is odd, or even, is round-off
-        best = form if best is None or other else min(best, form, key=lambda form: form.uncertainty)
-        if _resolved(form, odd, change <= seen):
+        best = found if best is None or other else min(best, found, key=lambda each: each.form.uncertainty)
+        if found.resolved(found.change <= seen):
             break
     return best
-
-
-def _resolved(form: NormalForm, odd: float, least: bool) -> bool:
-    """Whether no smaller scale is tried: the series is resolved, the load ``odd`` or even, or its change ``least``."""
-    return least or (min(odd, 1 - odd) < RESOLVED and form.resolved(RESOLVED))
 
 
 def alike(a: NormalForm, b: NormalForm) -> bool:
@@ -194,13 +214,14 @@ def alike(a: NormalForm, b: NormalForm) -> bool:
 
 def _at_scale(
     solver: BranchSolver, origin: Origin, direction: PETSc.Vec, row: PETSc.Vec, scale: float
-) -> tuple[NormalForm, float, float] | None:
-    """Normal form by amplitudes of a scale, the part of the load that is odd, and its change at the least amplitude."""
-    amplitudes, points = AMPLITUDES * scale, list[tuple[float, float]]()
+) -> Expansion | None:
+    """The branch by amplitudes of a scale; None where it has no states at one of them."""
+    amplitudes, points, states = AMPLITUDES * scale, list[tuple[float, float]](), list[PETSc.Vec]()
     for a in (*amplitudes, *-amplitudes):
         x = origin.x + direction * float(a)
         if not correct(solver.system, x, row, reach=2.0 * abs(float(a))).converged:
             return None
+        states.append(x)
         points.append((solver.system.scalar(x) - origin.load, solver.shape.ordinate(x) - origin.ordinate))
     loads, ordinates = np.array(points).T.reshape(2, 2, len(amplitudes))
     span = solver.system.scene.span
@@ -208,16 +229,18 @@ def _at_scale(
     if most < VERTICAL * abs(span[1] - span[0]) * scale**2:
         of = ORDINATE if moved > SEEN * origin.ordinate_left else DISTANCE
         left = float(most / (moved if of == ORDINATE else amplitudes[0]))
-        return NormalForm(VERTICAL_BRANCH, 0.0, 1, left, 0, of), 0.0, 0.0
+        form = NormalForm(VERTICAL_BRANCH, 0.0, 1, left, 0, of)
+        return Expansion(form, amplitudes, states, Leading(0.0, 0.0, most), 2, None, 0.0, 0.0)
     (even, odd), one = parts(loads), solver.units.ordinate
     change = abs(loads[0, -1]) + abs(loads[1, -1])
     uneven = float(2 * abs(odd[-1]) / change)
     x = leading_term(amplitudes, ordinates / one, origin.ordinate_left / one)
     slope = leading(amplitudes, odd, 1, origin.load_left)
     if uneven > 0.1:
-        return _transcritical(slope, x, one), uneven, change
+        return Expansion(_transcritical(slope, x, one), amplitudes, states, slope, 1, x, uneven, change)
     hidden = (abs(slope.best) + abs(slope.best - slope.rough)) / float(amplitudes[-1])
-    return _pitchfork(leading(amplitudes, even, 2, origin.load_left), hidden, x, one), uneven, change
+    load = leading(amplitudes, even, 2, origin.load_left)
+    return Expansion(_pitchfork(load, hidden, x, one), amplitudes, states, load, 2, x, uneven, change)
 
 
 def _transcritical(load: Leading, x: Term, one: float) -> NormalForm:

@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 31365,
+    "lines of Python": 31479,
     "files of Python": 147,
     "lines of C": 1026,
     "module constants with a number": 244,

@@ -109,6 +109,7 @@ def test_size_of_a_displacement_at_a_transcritical_point() -> None:
     (found,) = diagram.special("branch point", "straight")
     expected = 8 / pi**3 * sqrt(2) / pi / sqrt(1 + 1 / pi**2)
     assert check_law(found, "transcritical", expected, 1e-4).of == "distance"
+    assert found.coefficient_derivative("k").value == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.few(1)
@@ -126,6 +127,8 @@ def test_ring_of_intrinsic_twist(C: float) -> None:
     assert found.law is not None
     assert found.law.kind == f"{'super' if C > 11 / 8 else 'sub'}critical pitchfork"
     assert found.law.coefficient == pytest.approx((C - 11 / 8) / C, abs=1e-7)
+    slope = found.coefficient_derivative("C")
+    assert abs(slope.value - 11 / 8 / C**2) <= slope.error < 1e-5
 
 
 @pytest.mark.few(1)
@@ -143,6 +146,7 @@ def test_foundation_that_is_softer_on_one_side(beta: float, folds: int) -> None:
     diagram = traced((9.5, 10.5), linear, {"k": beta}, potential=lambda x, c: c.k * x.r[0] ** 3)
     (point,) = diagram.special("branch point", "straight")
     check_law(point, "transcritical", slope, 1e-3 * slope)
+    assert point.coefficient_derivative("k").value == pytest.approx(8 / pi**3, abs=1e-9)
     assert [b.name for b in diagram] == ["straight", "branch 1", "branch 2"]
     assert np.sign([b.points[-1].ordinate for b in diagram.branches[1:]]).tolist() == [1.0, -1.0]
     assert [b.points[-1].stable for b in diagram.branches[1:]] == [False, True]
