@@ -37,9 +37,16 @@ from rodfem.problem.functions import (
     role_field,
 )
 from rodfem.problem.table import Entry, Table
-from rodfem.problem.trials import check_function, expressions_of, names_in, needs_centreline, symbols
+from rodfem.problem.trials import (
+    check_function,
+    expressions_of,
+    names_in,
+    names_in_inertia,
+    needs_centreline,
+    symbols,
+)
 from rodfem.problem.units import Units, units_of
-from rodfem.problem.validation import check_scene, inertia_at
+from rodfem.problem.validation import check_scene
 from rodfem.tolerances import NEGLIGIBLE, SAME_PLACE, TINY, same_place
 
 GIVEN = re.compile(r"branch \d+(\.\d+)*|detached( \d+(\.\d+)*)?|found \d+ at .*")
@@ -546,8 +553,7 @@ class Scene(Contribution, metaclass=Stated):
     @cached_property
     def inertia_depends_on_load(self) -> bool:
         """Whether a mass or a rotary inertia, along the rod or attached to it, is a function of the load."""
-        first, *others = (inertia_at(self, load) for load in self.loads())
-        return any(other != first for other in others)
+        return f"c.{self.load}" in names_in_inertia(self)
 
     @cached_property
     def units(self) -> Units:

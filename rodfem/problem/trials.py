@@ -93,6 +93,13 @@ def asked_for(scene: Scene) -> set[str]:
     return {name.removeprefix("c.") for name in names if name.startswith("c.")}
 
 
+def names_in_inertia(scene: Scene) -> set[str]:
+    """Names of the constants in what masses and rotary inertias, or drag, return."""
+    functions = (f for owner in (scene.inertia, *scene.attachments) for f in functions_of(owner, nested=False))
+    own = ((what, f, role) for what, f, role in functions if role.call == "f(c)" and role.load is None)
+    return {name for each in own for name in _Trial(scene, *each, None).names}
+
+
 def is_placed(scene: Scene) -> bool:
     """Whether a function of a place, a spring or a constraint, depends on where the rod is."""
     return any(trial.asks_where for trial in _trials(scene) if trial.role.call == "f(x, c)")

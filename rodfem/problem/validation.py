@@ -118,7 +118,7 @@ def check_start(scene: Scene) -> None:
 
 def trouble_with_inertia(scene: Scene, load: float | None) -> str:
     """Sentence on a mass or a rotary inertia that cannot be, at a ``load`` or the scene's own; empty for none."""
-    masses, rotary = inertia_at(scene, load)
+    masses, rotary = _inertia_at(scene, load)
     least, largest = min(masses + rotary), max(masses + rotary)
     there = "" if load is None else f" at {scene.load} = {load:g}"
     if least < 0:
@@ -133,7 +133,7 @@ def trouble_with_inertia(scene: Scene, load: float | None) -> str:
     )
 
 
-def inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
+def _inertia_at(scene: Scene, load: float | None) -> tuple[list[float], list[float]]:
     """Masses and rotary inertias of a scene at a ``load``, by default its own: of the rod at its samples."""
     c, along = scene.constants(load), [scene.constants(load, s) for s in scene.samples()]
     masses = [float(x.mass(c)) for x in scene.attachments if x.mass]
