@@ -369,7 +369,7 @@ RIGHT: list[dict[str, Any]] = [
     {"interval": [0, np.int64(1)], "span": np.array([0.0, 3.0])},
     {"interval": (0, Fraction(1, 1))},
     {"breaks": (Fraction(1, 2),), "attachments": (Attachment(Fraction(1, 2), mass=Fraction(1, 3)),)},
-    pushed(force=lambda c: (Fraction(0), np.int64(0), np.float32(0) - c.P)),
+    pushed(force=lambda c: (Fraction(0), np.float32(0), np.int64(0) - c.P)),
     left((Fraction(0), np.int64(0), 0), (Fraction(1), np.int64(0), 0, 0)),
     pushed(energy=lambda x, c: ufl.ln(x.d3[2] + 2)),
     left(np.zeros(3), np.array([2.0, 0, 0, 0])),
