@@ -35,8 +35,6 @@ OTHER = 0.05
 """Relative difference of stored energies of two resolved states that are two equilibria, not one with two errors."""
 FAMILY = "no symmetry of the scene explains"
 """What is said where two traces may have two states of a family."""
-NO_BAR = ("not estimated", "no error estimate")
-"""Words of the note on a special point that has no error bar."""
 APART = 0.05
 """Part of the range beyond which two special points outside each other's bars are two: each lacks a partner."""
 AT = (0.37, 0.81)
@@ -236,7 +234,7 @@ def check_specials(
             out.differs.append(f"{where}: {describe(s)} has no partner")
             continue
         left.remove(t)
-        if any(x.resolved is False or any(words in x.note for words in NO_BAR) for x in (s, t)):
+        if any(x.resolved is False or not isfinite(x.error_estimate) for x in (s, t)):
             out.unresolved += 1
             continue
         out.ratios.append(ratio)
