@@ -40,7 +40,7 @@ from rodfem.continuation.branch import DISTANCE, ORDINATE, Point, SpecialPoint
 from rodfem.continuation.branch_solver import BranchSolver
 from rodfem.continuation.eigenvalue_curves import SHARP
 from rodfem.continuation.kinds import FLUTTER, FOLD
-from rodfem.continuation.normal_form import LINEAR, SIZE, Expansion, Origin, expansion_of, parts
+from rodfem.continuation.normal_form import LINEAR, SIZE, Expansion, Origin, expansion_of, leading, parts
 from rodfem.continuation.singular import SingularSystem
 from rodfem.errors import ConvergenceError, InputError
 from rodfem.fem.shape import halved
@@ -281,28 +281,27 @@ def _move(solver: BranchSolver, x: PETSc.Vec, right: PETSc.Vec, reach: float) ->
     return system.scalar(change), float(ordinate)
 
 
-def _fitted(a: np.ndarray, values: np.ndarray, powers: np.ndarray) -> np.ndarray:
-    """Coefficients of the ``powers`` of ``a`` in the polynomial through ``values``, (m,) all."""
-    return np.linalg.solve(a[:, None] ** powers, values)
-
-
 def _rate(found: Expansion, moves: np.ndarray, first: int, rate: float) -> float:
     """The derivative by the amplitudes from the ``first`` on, at which ``moves`` (2, 2, 2, m) are known."""
     a, (tangents, changes), power = found.amplitudes[first:], moves, found.form.power
-    even, odd = (2.0 * np.arange(len(a)) + least for least in (0, 1))
-    load = (found.load.best, found.load.rough)[first]
-    sides = parts(changes[0])
-    off = (rate - _fitted(a, sides[0], even)[0]) if found.order == 1 else -_fitted(a, sides[1], odd)[0] / 2
-    of_load, of_ordinate = (parts(each) for each in changes + tangents * (off / load))
-    slope = _fitted(a, of_load[1], odd)[0] if found.order == 1 else _fitted(a, of_load[0], even)[1]
+    load, (even, odd) = (found.load.best, found.load.rough)[first], parts(changes[0])
+
+    def term(values: np.ndarray, order: int, step: int = 2) -> float:
+        return leading(a, values, order, 0.0, step).best
+
+    off = (rate - term(even, 0)) if found.order == 1 else -term(odd, 1) / 2
+    (even, odd), (x_even, x_odd) = (parts(each) for each in changes + tangents * (off / load))
+    slope = term(odd, 1) if found.order == 1 else term(even - term(even, 0), 2)
     if found.x is None or found.form.of == DISTANCE:
-        return float(slope)
-    term, leading, _ = found.x
-    x = (leading.best, leading.rough)[first]
-    if term == LINEAR:
-        change = _fitted(a, of_ordinate[1], odd)[0]
+        return slope
+    kind, coefficient, _ = found.x
+    x = (coefficient.best, coefficient.rough)[first]
+    if kind == LINEAR:
+        change = term(x_odd, 1)
+    elif kind == SIZE:
+        change = term(x_even - term(x_even, 0, step=1), 1)
     else:
-        change = _fitted(a, of_ordinate[0], np.append(0.0, odd[:-1]) if term == SIZE else even)[1]
+        change = term(x_even - term(x_even, 0), 2)
     return float((slope - power * load / x * change) / x**power)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[2] / "rodfem"
 MOST = {
-    "lines of Python": 31492,
+    "lines of Python": 31491,
     "files of Python": 147,
     "lines of C": 1026,
     "module constants with a number": 244,
